@@ -92,8 +92,9 @@ def _in_short(result: Result) -> str:
     if saved:
         worst = max(saved, key=lambda one: one.bound)
         words.append(
-            f"With {_percent(CONFIDENCE)} confidence **{math.ceil(worst.bound)} m above the ground "
-            f"are enough** for at least {_percent(worst.share)} of each failure in the table"
+            f"With {_percent(CONFIDENCE)} confidence **{math.ceil(worst.bound)} m above the "
+            f"ground are enough** for at least {_percent(worst.share)} of each failure in the "
+            "table"
             + (", but for those named next." if lost else ".")
             + f" The failure that needs the most is: {_name(worst)}."
         )

@@ -14,17 +14,18 @@ below is of a described vehicle in a simulated world.
 
 **The numbers prove nothing about a real vehicle, and this page is no certificate.** They show
 what this product's part of the time and of the height is, and they fit your vehicle as well as
-its description and the assumptions below do. Describe your own:
-[guide](../guide/minimum_height.md)."""
+its description and the assumptions below do. `docs/guide/minimum_height.md` says how to describe
+your own."""
 
 HOW = f"""\
-- Each flight is a flight of the [fault campaign](campaign.md): the real core, protocols and
-  runtime, with simulated devices in virtual time. Mass, drag, canopy, heights, wind, link,
-  autopilot and profile are those of the description. Nothing fails besides the failure itself.
+- Each flight is a flight of the fault campaign (`docs/evidence/campaign.md`): the real core,
+  protocols and runtime, with simulated devices in virtual time. Mass, drag, canopy, heights, wind,
+  link, autopilot and profile are those of the description. Nothing fails besides the failure
+  itself.
 - Each seed is flown from a height that the vehicle is flown at, and then from lower heights with
   the same gusts and messages, down to the least height (to {GRAIN:g} m) from which the vehicle
-  is saved. Saved: the canopy is open, and the vehicle no faster than `soft_landing`, before it
-  touches down. If it is not saved from the usual height, it is tried from {CEILING:g} m.
+  is saved. Saved: the parachute is out, and the vehicle no faster than `soft_landing` when the
+  canopy is open or when it touches down. If it is not saved from the usual height, it is tried from {CEILING:g} m.
 - The heights are above the ground, at the moment of the failure. Each height was flown, so the
   rules' own heights are in it: `minimum_height`, and `low_height` with its shorter wait for the
   kill.
@@ -60,6 +61,6 @@ ASSUMPTIONS = f"""\
   autopilot that hangs while the vehicle flies on."""
 
 WITH_FAULTS = """\
-The same failures, each with one of the campaign's faults or more, up to {}, within 2 s of it: messages lost,
-late or damaged, processes and devices that stop, clocks that are set, sensors that are wrong. A
-flight that was released before its failure is left out of the count."""
+The same failures, each with one of the campaign's faults or more, up to {}, within 2 s of it:
+messages lost, late or damaged, processes and devices that stop, clocks that are set, sensors that
+are wrong. A flight that was released before its failure is left out of the count."""
