@@ -23,9 +23,10 @@ HOW = f"""\
   link, autopilot and profile are those of the description. Nothing fails besides the failure
   itself.
 - Each seed is flown from a height that the vehicle is flown at, and then from lower heights with
-  the same gusts and messages, down to the least height (to {GRAIN:g} m) from which the vehicle
-  is saved. Saved: the parachute is out, and the vehicle no faster than `soft_landing` when the
-  canopy is open or when it touches down. If it is not saved from the usual height, it is tried from {CEILING:g} m.
+  the same gusts and messages, down to the least height (to {GRAIN:g} m) from which it is saved.
+  Saved: the parachute is out, and the vehicle no faster than `soft_landing` when the canopy is
+  open or when it touches down. If it is not saved from the usual height, it is tried from
+  {CEILING:g} m.
 - The heights are above the ground, at the moment of the failure. Each height was flown, so the
   rules' own heights are in it: `minimum_height`, and `low_height` with its shorter wait for the
   kill.
