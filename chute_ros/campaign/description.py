@@ -36,7 +36,8 @@ _SOFT = 1.25
 
 @dataclass(frozen=True)
 class Field:
-    """A number of the description. spread: it may be [least, most]."""
+    """A number of the description. default: in words; empty: needed. spread: it may be [least,
+    most]."""
 
     meaning: str
     unit: str
@@ -44,6 +45,12 @@ class Field:
     most: float
     default: str = ""
     spread: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """In words."""
+        spread = ", or [least, most]" if self.spread else ""
+        return f"{self.least:g} to {self.most:g} {self.unit}{spread}"
 
 
 NUMBERS = {
@@ -70,12 +77,52 @@ NUMBERS = {
     ),
     "wind": Field("the strongest wind that it flies in", "m/s", 0.0, 20.0, "8"),
 }
-#: The other fields: what they may be is in the guide (docs/guide/minimum_height.md).
-_WORDS = (
-    *("vehicle", "kind", "parachute", "self_release", "autopilot", "vehicle_sources"),
-    *("profile", "sinks"),
-)
-_NEEDED = (*("vehicle", "kind", "mass", "drag_area", "descent_rate", "opening_time", "heights"),)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A field of the description that is no number. allowed: in words; default: empty: needed."""
+
+    meaning: str
+    allowed: str
+    default: str = ""
+
+
+CHOICES = {
+    "vehicle": Choice("its name, for the page", "words"),
+    "kind": Choice("what falls, and how", " or ".join(KINDS)),
+    "parachute": Choice(
+        "how its parachute is spoken to: name of a vehicle of `config/`, as in "
+        "`config/NAME_vehicle.yaml`",
+        "mavlink, upf, both, relay, or a vehicle of another link that the campaign flies",
+        "mavlink",
+    ),
+    "self_release": Choice(
+        "the controller of a UPF parachute may release it by itself", "true or false", "false"
+    ),
+    "autopilot": Choice(
+        "whose autopilot it is: how it answers a kill, and what its home does",
+        "; ".join(f"{kind}: {', '.join(names)}" for kind, names in AUTOPILOTS.items()),
+        PX4.name,
+    ),
+    "vehicle_sources": Choice(
+        "where the supervisor learns of the vehicle, as its node's parameter; all but "
+        f"{VEHICLE_STATE} outlive the autopilot",
+        f"one or more of {', '.join(SOURCES)}",
+        VEHICLE_STATE,
+    ),
+    "profile": Choice(
+        "the rules of the supervisor",
+        "name of a shipped profile, or path of a file from the folder of the description",
+        "the kind",
+    ),
+    "sinks": Choice(
+        "sinks in the end, m/s, a number or [least, most] for each name",
+        "; ".join(f"{kind}: {', '.join(names)}" for kind, names in SINKS.items()),
+        "as the campaign draws",
+    ),
+}
+FIELDS: dict[str, Choice | Field] = {**CHOICES, **NUMBERS}
 
 
 def parachutes() -> tuple[str, ...]:
@@ -104,9 +151,9 @@ class _Description(ProfileLines):
 
     def read(self, where: Where) -> DescribedVehicle | None:
         """What is written; mistakes are collected, and None is returned after one."""
-        entries = self.mapping(where, (*_WORDS, *NUMBERS), "a description of a vehicle")
-        for key in _NEEDED:
-            if key not in entries:
+        entries = self.mapping(where, FIELDS, "a description of a vehicle")
+        for key, field in FIELDS.items():
+            if not field.default and key not in entries:
                 self.wrong(where.line, f"{key} is missing: {_needs(key)}")
         kind = self._kind(entries)
         readers: dict[str, Callable[[Where], Any]] = {
@@ -119,9 +166,9 @@ class _Description(ProfileLines):
             "sinks": lambda w: self._sinks(w, SINKS[kind]),
         }
         values = {key: read(entries[key]) for key, read in readers.items() if key in entries}
-        for key, field in NUMBERS.items():
+        for key, number in NUMBERS.items():
             if key in entries:
-                values[key] = self._number(entries[key], key, field)
+                values[key] = self._number(entries[key], key, number)
         if self.mistakes:
             return None
         values["name"] = values.pop("vehicle")
@@ -197,7 +244,5 @@ def _links(parachute: str) -> tuple[str, ...]:
 
 
 def _needs(key: str) -> str:
-    if key in NUMBERS:
-        one = NUMBERS[key]
-        return f"need {one.least:g} to {one.most:g} {one.unit}, {one.meaning}"
-    return "need multirotor or fixed_wing" if key == "kind" else "need its name"
+    one = FIELDS[key]
+    return f"need {one.allowed}: {one.meaning}"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -95,7 +96,8 @@ def find(campaign: Campaign, jobs: int, at: Callable[[int], None]) -> list[Found
     process ended by itself, or a flight never took off."""
     shared = own_shipped(campaign.folder, campaign.vehicle.profile)
     flown = flown_here(partial(fly, campaign), shared, range(campaign.number), jobs)
-    return [Found(case, _taken(flown, campaign, at, n)) for n, case in enumerate(campaign.cases)]
+    with closing(flown):
+        return [Found(one, _taken(flown, campaign, at, n)) for n, one in enumerate(campaign.cases)]
 
 
 def _taken(
