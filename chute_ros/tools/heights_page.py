@@ -52,19 +52,10 @@ def page(results: Sequence[Result], command: str, how: str) -> str:
 def _vehicle(result: Result) -> list[str]:
     vehicle = result.campaign.vehicle
     lines = [
-        *(f"## {vehicle.name}", ""),
-        *(_in_short(result), "", f"![heights]({result.picture})", ""),
-        *(
-            "### Height that is needed",
-            "",
-            _HEIGHTS,
-            "",
-            heights(result.plain),
-            "",
-            _minimum(result),
-            "",
-        ),
-        *("### Time from the failure", "", _TIMES, "", times(result.plain), ""),
+        *(f"## {vehicle.name}", "", _in_short(result), "", f"![heights]({result.picture})", ""),
+        *("### Height that is needed", "", _HEIGHTS, "", heights(result.plain), ""),
+        *(_minimum(result), "", "### Time from the failure", "", _TIMES, ""),
+        *(times(result.plain), ""),
     ]
     faults = result.campaign.faults
     if faults:
@@ -136,7 +127,7 @@ def heights(every: Sequence[Found]) -> str:
         lost = [_m(statistics.median(values)) if values else "" for values in _parts(one)]
         saved, least = one.usual_saved
         told = f"{saved} of {len(one.needed)} (at least {_percent(least)})"
-        middle = statistics.median(one.needed) if one.needed else math.inf
+        middle = statistics.median(one.needed) if one.needed else math.nan
         rows.append((_name(one), _m(middle), f"**{_m(one.bound)}**", _share(one), *lost, told))
     return table((*head, *parts, "saved from the usual heights"), rows)
 
@@ -227,4 +218,6 @@ def _percent(share: float) -> str:
 
 
 def _m(height: float) -> str:
+    if math.isnan(height):
+        return "not flown"
     return "no height" if math.isinf(height) else f"{height:.1f} m"
