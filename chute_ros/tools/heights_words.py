@@ -49,6 +49,8 @@ ASSUMPTIONS = f"""\
 - **Wind**: gusts push up and down, with {GUSTS_OF_WIND:g} m/s^2 for each m/s of wind. No drift,
   no steady up- or downdraught, no sideways touchdown: the energies are of the vertical speed
   alone.
+  A gust may carry what sinks slowly (`thrust partly lost`) for seconds: then it sinks no faster
+  than softly, is noticed late, and needs more height.
 - **Failure**: sudden and complete, in steady flight for {FLOWN_BEFORE:g} s and more. Each number
   that has a range is drawn from it, each as likely; sinks that the description leaves out are
   drawn like the campaign's.
