@@ -121,15 +121,15 @@ def _minimum(result: Result) -> str:
 def heights(every: Sequence[Found]) -> str:
     """Of each case: what it needs."""
     head = ("failure", "median", "bound", "of such failures at least")
-    parts = ("noticed", "chain", "opening")
     rows = []
     for one in every:
-        lost = [_m(statistics.median(values)) if values else "" for values in _parts(one)]
+        lost = " + ".join(f"{statistics.median(values):.1f}" for values in _parts(one) if values)
         saved, least = one.usual_saved
         told = f"{saved} of {len(one.needed)} (at least {_percent(least)})"
         middle = statistics.median(one.needed) if one.needed else math.nan
-        rows.append((_name(one), _m(middle), f"**{_m(one.bound)}**", _share(one), *lost, told))
-    return table((*head, *parts, "saved from the usual heights"), rows)
+        needs = (_m(middle), f"**{_m(one.bound)}**", _share(one))
+        rows.append((_name(one), *needs, f"{lost} m" if lost else "", told))
+    return table((*head, "noticed + chain + opening", "saved from the usual heights"), rows)
 
 
 def _parts(found: Found) -> list[list[float]]:
