@@ -46,6 +46,9 @@ CAMPAIGN_ARGS ?=
 TAPES_FOLDER ?= tapes
 TAPES_ARGS ?=
 TAPES ?=
+# The described vehicles of make minimum-height, and what else its command takes ("--flights 100").
+VEHICLES ?= config/vehicles/example_multirotor.yaml config/vehicles/example_aeroplane.yaml
+HEIGHT_ARGS ?=
 WITHOUT_ARGS ?=
 COMPARE_ARGS ?=
 
@@ -65,7 +68,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign compare conformance case without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign minimum-height compare conformance case without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -101,6 +104,11 @@ campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n o
 	    $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(CAMPAIGN_ARGS) \
 	    $(if $(TAPES),--tapes "$(TAPES)" --tapes-only --page docs/evidence/bodies.md,$(if $(EACH),--each $(EACH) \
 	    --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md))
+
+minimum-height: build ## the height and the time that failures of the VEHICLES need, write docs/evidence/minimum_height.*
+	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
+	    -m chute_ros.tools.campaign --vehicle $(VEHICLES) --seed $(SEED) \
+	    --page docs/evidence/minimum_height.md $(HEIGHT_ARGS)
 
 tapes: .venv-bodies/done ## record multirotors of RotorPy and aeroplanes of JSBSim in TAPES_FOLDER, for make campaign TAPES=...
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 exec .venv-bodies/bin/python -m bodies $(TAPES_FOLDER) $(TAPES_ARGS)

@@ -37,6 +37,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*.xml")),
         ("share/" + NAME + "/config/layouts", glob("config/layouts/*")),
         ("share/" + NAME + "/config/profiles", glob("config/profiles/*.yaml")),
+        ("share/" + NAME + "/config/vehicles", glob("config/vehicles/*.yaml")),
         ("share/" + NAME + "/config/security", glob("config/security/*.xml")),
     ],
     zip_safe=False,

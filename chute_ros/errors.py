@@ -33,7 +33,8 @@ class RecordError(ChuteError, ValueError):
 
 
 class ProfileError(ChuteError, ValueError):
-    """A profile of rules is not right. The text lists each mistake with its line and the fix."""
+    """A profile of rules, or the description of a vehicle, is not right. The text lists each
+    mistake with its line and the fix."""
 
 
 class CampaignError(ChuteError):

@@ -45,6 +45,11 @@ def test_the_table_of_measurements_is_up_to_date() -> None:
     assert text == parameter_docs.rules_text(text), "run: make docs"
 
 
+def test_the_table_of_a_description_is_up_to_date() -> None:
+    text = (ROOT / parameter_docs.DESCRIPTION).read_text()
+    assert text == parameter_docs.description_text(text), "run: make docs"
+
+
 def test_each_file_on_the_way_of_a_frame_is_there() -> None:
     text = (ROOT / "docs/design/way_of_a_frame.md").read_text()
     # A name alone is of the folder that was named before it on its line.

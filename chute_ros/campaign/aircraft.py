@@ -91,6 +91,8 @@ class Aircraft(Rig):
         self.world.add(self.nature)
         for source in scenario.second_sources:
             self.add_source(source, self.model)
+        #: From its arming until it leaves the ground, s.
+        self.spools_up = _SPOOLS_UP
         self._speed = 0.0
         self._left = self._flew = False
         self._first_out = ""
@@ -106,7 +108,7 @@ class Aircraft(Rig):
     def take_off(self, now: float) -> None:
         self.autopilot.act("arm")
         self.world.stir(self.plugs["autopilot"])
-        self.world.post(now + _SPOOLS_UP, self._leave)
+        self.world.post(now + self.spools_up, self._leave)
 
     def _leave(self, now: float) -> None:
         self.autopilot.act(f"takeoff={self.scenario.height}")

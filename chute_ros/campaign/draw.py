@@ -91,7 +91,7 @@ def draw(seed: int) -> Scenario:
         burn,
         failure,
         failure_at,
-        tuple(_fault(chance, vehicle, around, standby) for _ in range(count)),
+        tuple(fault_around(chance, vehicle, around, standby) for _ in range(count)),
         standby,
         aps=chance.random() < 0.5,
         arms=rocket or chance.random() < 0.3,
@@ -134,7 +134,8 @@ def _when(chance: random.Random, around: float) -> tuple[float, float]:
     return begin, round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
 
 
-def _fault(chance: random.Random, vehicle: str, around: float, standby: bool) -> Fault:
+def fault_around(chance: random.Random, vehicle: str, around: float, standby: bool) -> Fault:
+    """Anything that goes wrong besides the failure, at most 2 s before or after around, s."""
     begin, lasts = _when(chance, around)
     end = round(begin + lasts, 3)
     supervisors = ("supervisor", "standby") if standby else ("supervisor",)

@@ -24,7 +24,7 @@ from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
 #: Ends of an aeroplane's controlled flight: m/s down, s, degrees, m/s^2.
-_ENDS = {
+ENDS = {
     "flat spin": (10.0, 1.0, 20.0, 10.5),
     "upright spin": (12.0, 1.5, 65.0, 13.0),
     "steep spin": (18.0, 1.5, 75.0, 15.0),
@@ -32,6 +32,8 @@ _ENDS = {
     "spiral dive": (17.0, 2.7, 72.0, 22.0),
     "dive": (14.0, 2.0, 40.0, 9.0),
 }
+#: Name of the descent of a multirotor with less thrust than it needs.
+PARTIAL_THRUST = "partial thrust"
 #: Of so many flights each of these is one, and of so many of those in which nothing fails it flies
 #: a manoeuvre, half of them with one sensor wrong in it.
 _GROUNDS, _DRIFTS, _HOME_MOVES, _ESTIMATORS, _CANOPIES = 0.2, 0.1, 0.1, 0.15, 0.06
@@ -54,7 +56,7 @@ def in_the_world(chance: random.Random, drawn: Scenario) -> Scenario:
     drawn = replace(drawn, autopilot=_autopilot(chance, drawn.profile))
     if drawn.failure is Failure.NOTHING and chance.random() < _STANDS:
         return _on_the_ground(chance, drawn)
-    drawn = _with_body(chance, drawn)
+    drawn = with_body(chance, drawn)
     drawn = _over_ground(chance, drawn)
     if chance.random() < _HOME_MOVES:
         by = round(chance.choice((-1.0, 1.0)) * chance.uniform(5.0, 60.0), 1)
@@ -95,13 +97,13 @@ def _autopilot(chance: random.Random, profile: str) -> Autopilot:
     return Autopilot(homing, drifts, kind.name, chance.choice((1, 2)))
 
 
-def _with_body(chance: random.Random, drawn: Scenario) -> Scenario:
+def with_body(chance: random.Random, drawn: Scenario) -> Scenario:
     """An aeroplane has one of its own; one that breaks tumbles like anything else."""
     failure = drawn.failure
     if failure is Failure.SINK:
         lean, settles = chance.uniform(0.05, 0.4), chance.uniform(1.0, 2.5)
         sinks = Descent(
-            "partial thrust",
+            PARTIAL_THRUST,
             round(chance.uniform(7.0, 12.0), 1),
             round(settles, 2),
             round(lean, 2),
@@ -109,17 +111,18 @@ def _with_body(chance: random.Random, drawn: Scenario) -> Scenario:
         return replace(drawn, descent=sinks)
     if drawn.profile != "fixed_wing" or failure is Failure.MOTOR:
         return drawn
-    unheld = _end(chance, "spiral dive")
+    unheld = end_of_control(chance, "spiral dive")
     held = unheld
     if failure is Failure.STALL:
-        held = unheld = _end(chance, chance.choice(list(_ENDS)))
+        held = unheld = end_of_control(chance, chance.choice(list(ENDS)))
     elif failure is Failure.GLIDE:
         held = Descent("glide", round(chance.uniform(1.5, 4.0), 1), 1.5, 0.1)
     return replace(drawn, descent=held, unheld=unheld)
 
 
-def _end(chance: random.Random, name: str) -> Descent:
-    sink, settles, tilt, force = (one * chance.uniform(0.9, 1.1) for one in _ENDS[name])
+def end_of_control(chance: random.Random, name: str) -> Descent:
+    """One of ENDS, each number up to a tenth more or less."""
+    sink, settles, tilt, force = (one * chance.uniform(0.9, 1.1) for one in ENDS[name])
     tilt = round(math.radians(tilt), 2)
     return Descent(name, round(sink, 1), round(settles, 2), tilt, round(force, 1))
 

@@ -28,7 +28,8 @@ class Shipped:
         key = (vehicle, profile)
         if key not in self._configs:
             told = vehicles()[vehicle].supervised
-            text = (self._folder / f"{profile}.yaml").read_text(encoding="utf-8")
+            file = self.profile_file(profile)
+            text = file.read_text(encoding="utf-8")
             plain = SupervisorConfig(
                 required_links=told("required_links"),
                 kill_links=told("kill_links"),
@@ -36,8 +37,12 @@ class Shipped:
                 unmonitored_links=told("unmonitored_links", ()),
                 deploy_ladder=tuple(Rung.parse(text) for text in told("deploy_ladder", ())),
             )
-            self._configs[key] = replace(plain, profile=read_profile(text, profile, plain.links))
+            self._configs[key] = replace(plain, profile=read_profile(text, str(file), plain.links))
         return replace(self._configs[key], standby=standby, rank=rank)
+
+    def profile_file(self, kind: str) -> Path:
+        """The profile by which a vehicle of this kind flies."""
+        return self._folder / f"{kind}.yaml"
 
     def tape(self, name: str) -> Tape:
         """The tape with this name. RecordError: there is none."""

@@ -56,6 +56,11 @@ class WindyModel(GustyModel):
         return flown
 
 
+def lift_time(height: float) -> float:
+    """How long it is carried up to this height, s."""
+    return math.ceil(height / (_LIFT * STEP)) * STEP
+
+
 class Nature:
     """Moves the vehicle on, whoever hangs or has no power. ground: under it once it is up, m above
     its take-off; moved: called after each step."""

@@ -27,7 +27,7 @@ STEP = 0.02  # s
 #: From arming to the take-off of action fly, s: as long as autopilots spool up.
 _SPOOLS_UP = 1.0
 #: Usual strength of the gusts of each m/s of wind, m/s^2.
-_GUSTS = 0.15
+GUSTS_OF_WIND = 0.15
 #: The same in still air: no vehicle hovers without moving; what does not is taken for stuck.
 _STILL_AIR = 0.1
 _MOTOR, _OFF = float(dialect.FAILURE_UNIT_SYSTEM_MOTOR), float(dialect.FAILURE_TYPE_OFF)
@@ -188,7 +188,7 @@ class AutopilotDevice(AutopilotTelemetry):
 
     def _blow(self, speed: float) -> None:
         self.model.calm()
-        self.model.gusts = max(_STILL_AIR, _GUSTS * speed)
+        self.model.gusts = max(_STILL_AIR, GUSTS_OF_WIND * speed)
 
     def _mend(self) -> None:
         self.model.mend()

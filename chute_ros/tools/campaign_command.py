@@ -3,6 +3,8 @@
 A wrong flight is saved as a scenario, as text: --replay SEED or FILE shows it step by step.
 Ctrl-C ends the campaign: the flights until then are counted and written; --resume FILE continues.
 --scheduler flies them on the workers of a Dask cluster: docs/guide/cluster.md.
+--vehicle flies the failures of a described vehicle, and finds the height and the time that each
+needs: docs/guide/minimum_height.md.
 """
 
 from __future__ import annotations
@@ -35,8 +37,11 @@ from chute_ros.tools.campaign_bodies import page_of_bodies
 from chute_ros.tools.campaign_page import page
 from chute_ros.tools.campaign_picture import picture
 from chute_ros.tools.campaign_plan import plan
+from chute_ros.tools.campaign_vehicle import FLIGHTS, fly_described, refuse_unfit
 from chute_ros.tools.machine import machine
 
+#: Where none are asked for.
+_FLIGHTS = 1000
 _TELL_EVERY = 5.0  # s
 _KEEP_EVERY = 60.0  # s
 #: So many of those that must not be are told; all are saved.
@@ -59,7 +64,11 @@ def main() -> None:
     """Fly; exit code 1 if a flight was wrong."""
     options = argparse.ArgumentParser("campaign", description=__doc__)
     options.add_argument(
-        "--flights", type=positive, default=1000, help="number of flights (default: 1000)"
+        "--flights",
+        type=positive,
+        help=(
+            f"number of flights (default: {_FLIGHTS}; with --vehicle of each failure: {FLIGHTS})"
+        ),
     )
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     options.add_argument(
@@ -120,9 +129,31 @@ def main() -> None:
         metavar="PRICE",
         help="price of a core for an hour, in any currency, for the costs of --plan",
     )
+    options.add_argument(
+        "--vehicle",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="find the height and the time that each failure of these described vehicles needs",
+    )
+    options.add_argument(
+        "--faults",
+        type=positive,
+        default=0,
+        metavar="N",
+        help="with --vehicle: fly each failure again with 1 to N faults around it",
+    )
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
     profiles = config_folder() / "profiles"
+    refuse_unfit(options, chosen)
+    if chosen.vehicle is not None:
+        try:
+            fly_described(options, chosen, profiles)
+        except CampaignError as error:
+            sys.exit(f"campaign: {error}")
+        return
+    chosen.flights = chosen.flights or _FLIGHTS
     if chosen.tapes_only and chosen.tapes is None:
         options.error("argument --tapes-only: name the file with --tapes")
     if chosen.tapes is not None and chosen.scheduler is not None:

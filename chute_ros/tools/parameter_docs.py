@@ -1,6 +1,7 @@
 """Writes config/ and the tables of docs/reference/ from the settings (make docs).
 
-The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md.
+The tables stand between marks in docs/reference/parameters.md, docs/reference/rules.md and
+docs/guide/minimum_height.md.
 With --check it only names the files that are out of date.
 """
 
@@ -10,6 +11,7 @@ import sys
 import textwrap
 from pathlib import Path
 
+from chute_ros.campaign.description import FIELDS
 from chute_ros.links.api import SUPERVISOR, VehicleKind, load
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
@@ -30,6 +32,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
 }
 PARAMETERS = Path("docs/reference/parameters.md")
 RULES = Path("docs/reference/rules.md")
+DESCRIPTION = Path("docs/guide/minimum_height.md")
 #: File -> its vehicle.
 CONFIGS: dict[Path, VehicleKind] = {
     Path(f"config/{name}_vehicle.yaml"): vehicle
@@ -82,6 +85,17 @@ def rules_text(before: str) -> str:
     return _between(before, RULES, begin, end, [table(head, rows)])
 
 
+def description_text(before: str) -> str:
+    """docs/guide/minimum_height.md with the table of a description's fields made anew."""
+    rows = [
+        (f"`{name}`", one.meaning, one.allowed, one.default or "needed")
+        for name, one in FIELDS.items()
+    ]
+    head = ("field", "meaning", "allowed", "if left out")
+    begin, end = "<!-- description -->", "<!-- end of description -->"
+    return _between(before, DESCRIPTION, begin, end, [table(head, rows)])
+
+
 def _between(before: str, path: Path, begin: str, end: str, rows: list[str]) -> str:
     head, found, rest = before.partition(begin)
     _, found_end, tail = rest.partition(end)
@@ -99,6 +113,7 @@ def _texts() -> dict[Path, str]:
     texts = {path: config_text(path) for path in CONFIGS}
     texts[PARAMETERS] = parameters_text(PARAMETERS.read_text())
     texts[RULES] = rules_text(RULES.read_text())
+    texts[DESCRIPTION] = description_text(DESCRIPTION.read_text())
     return texts
 
 

@@ -1,0 +1,94 @@
+"""`campaign --vehicle`: the heights that the failures of described vehicles need."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from chute_ros.campaign.confidence import flights_needed
+from chute_ros.campaign.description import read_description
+from chute_ros.campaign.heights import WANTED, Campaign, find, own_shipped
+from chute_ros.errors import ProfileError
+from chute_ros.supervisor.rules import BelowMinimum, Profile
+from chute_ros.tools.heights_page import Result, heights, page, times
+from chute_ros.tools.heights_picture import picture
+from chute_ros.tools.machine import machine
+from chute_ros.tools.progress import Progress
+
+#: Of each failure, where none are asked for: enough for the statement.
+FLIGHTS = flights_needed(WANTED)
+#: Options of the other campaign, which draws vehicles and faults of its own.
+_UNFIT = (
+    *("each", "scheduler", "resume", "tapes", "tapes_only", "replay", "plan"),
+    *("core_hour_price", "failures"),
+)
+
+
+def refuse_unfit(options: ArgumentParser, chosen: Namespace) -> None:
+    """Exit code 2: an option was given that does not fit."""
+    if chosen.vehicle is None:
+        if chosen.faults:
+            options.error(
+                "argument --faults: only with --vehicle; without it each flight has its own"
+            )
+        return
+    given = [one for one in _UNFIT if getattr(chosen, one) != options.get_default(one)]
+    if given:
+        name = given[0].replace("_", "-")
+        options.error(
+            f"argument --vehicle: not with --{name}: the failures of a described vehicle are "
+            "flown on this machine, all in one run, and no other flights"
+        )
+    if len({one.stem for one in chosen.vehicle}) < len(chosen.vehicle):
+        options.error("argument --vehicle: two files have the same name: rename one")
+
+
+def fly_described(options: ArgumentParser, chosen: Namespace, profiles: Path) -> None:
+    """Fly all vehicles, print what was found, and write the page. Exit code 2: a description is
+    not right."""
+    begun, flights = time.monotonic(), chosen.flights or FLIGHTS
+    campaigns, read = [], []
+    try:
+        for file in chosen.vehicle:
+            vehicle = read_description(file, profiles)
+            campaigns.append(Campaign(vehicle, profiles, chosen.seed, flights, chosen.faults))
+            read.append(_profile(campaigns[-1]))
+    except ProfileError as error:
+        options.error(f"argument --vehicle: {error}")
+    results = []
+    for file, campaign, profile in zip(chosen.vehicle, campaigns, read, strict=True):
+        progress = Progress(f"{campaign.vehicle.name}: flights", campaign.number)
+        every = find(campaign, chosen.jobs, progress.at)
+        drawn = f"{chosen.page.stem}.{file.stem}.svg" if chosen.page else ""
+        results.append(Result(file, campaign, every, profile, drawn))
+        print(f"{campaign.vehicle.name}, {flights} flights of each failure:\n")
+        print(f"{heights(every)}\n\n{times(results[-1].plain)}\n", flush=True)
+    if chosen.page:
+        took = f"{time.monotonic() - begun:.0f} s, {chosen.jobs} at a time on {machine()}"
+        _write(results, chosen.page, _command(chosen, flights), took)
+
+
+def _profile(campaign: Campaign) -> Profile:
+    """ProfileError: it is not right."""
+    vehicle = campaign.vehicle
+    shipped = own_shipped(campaign.folder, vehicle.profile)
+    return shipped.config(vehicle.parachute, vehicle.kind, False, 0).profile
+
+
+def _write(results: Sequence[Result], path: Path, command: str, how: str) -> None:
+    for one in results:
+        allows = one.profile.below_minimum is BelowMinimum.DEPLOY
+        lowest = 0.0 if allows else one.profile.minimum_height
+        path.with_name(one.picture).write_text(picture(one.plain, lowest))
+    path.write_text(page(results, command, how))
+
+
+def _command(chosen: Namespace, flights: int) -> str:
+    """By which the same page is written again."""
+    more = ["--faults", str(chosen.faults)] if chosen.faults else []
+    files = [str(one) for one in chosen.vehicle]
+    words = ["campaign", "--vehicle", *files, "--flights", str(flights), *more]
+    return shlex.join([*words, "--seed", str(chosen.seed), "--page", str(chosen.page)])
