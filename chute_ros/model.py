@@ -273,3 +273,11 @@ class Decision:
     def named(self) -> str:
         """Its number in words: an epoch is made of a time, and would be read as one."""
         return f"decision {self.id} of epoch {self.epoch}"
+
+
+def pressure_altitude(pressure: float) -> float:
+    """Height at which the standard atmosphere has this pressure (Pa), m (ICAO Doc 7488, below
+    11 km); NaN: it is no pressure."""
+    if not 1000.0 <= pressure <= 120_000.0:
+        return math.nan
+    return 44_330.77 * (1.0 - math.pow(pressure / 101_325.0, 0.190263))

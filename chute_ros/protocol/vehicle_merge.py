@@ -9,7 +9,8 @@ newest. Old words keep their true age: the supervisor decides how old is too old
 Two sources that tell otherwise of the same part at the same time dispute it: one of them lies, and
 mostly nobody knows which. Where one of them leapt as nothing that flies well does, and the other
 lives and did not, the doubt is the first one's alone. One that jumps as nothing at all does
-disputes its own word. So it stays for a while, also where only one of them is left.
+disputes its own word. So it stays for a while, also where only one of them is left. Where a
+barometer sides with one of two speeds, the other source's estimate is not used (speed_vote.py).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 
 from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol import vehicle_readings as readings
+from chute_ros.protocol.speed_vote import SpeedVote
 from chute_ros.protocol.stream_rate import SAID_AFTER, StreamRate
 
 #: The source with chute_msgs/VehicleState, and the one with MAVROS's topics. Both know the
@@ -68,6 +70,8 @@ _SAME_TIME = 0.1
 _DIFFER_FOR = 0.2
 #: Without two words to compare for so long, s, nobody knows whether they still do.
 _DIFFERENCE_PAUSES = 0.5
+#: Of one estimate: wrong together.
+_ESTIMATED = ("vertical_speed", "attitude", "attitude_error")
 #: So long it is remembered, s: as long as a fall may last.
 DISPUTED = 10.0
 
@@ -137,6 +141,7 @@ class VehicleMerge:
         self._disputed: dict[tuple[str, str], float] = {}
         #: (Part, source) -> how its words went on.
         self._courses: dict[tuple[str, str], _Course] = {}
+        self._vote = SpeedVote()
         #: (Part, two sources) -> since when they differ.
         self._differ: dict[tuple[str, frozenset[str]], _Difference] = {}
 
@@ -201,6 +206,7 @@ class VehicleMerge:
             for part in _DISPUTES
             if (source := self._source(part, now)) is not None
             and now - self._disputed.get((part, source), -math.inf) < DISPUTED
+            and not (part == "vertical_speed" and source in self._vote.confirmed)
         )
 
     def told_by(self, now: float) -> Mapping[str, str]:
@@ -232,6 +238,10 @@ class VehicleMerge:
                 self._follow(part, source, before, word)
             self._compare(part, source, word)
         self._words[source][part] = word
+        if part == "vertical_speed":
+            self._vote.hear_speed(source, values[0], received)
+        elif part == "pressure":
+            self._vote.hear_pressure(values[0], received)
 
     def _follow(self, part: str, source: str, before: _Word, word: _Word) -> None:
         """From one word of a source to its next."""
@@ -279,10 +289,18 @@ class VehicleMerge:
     def _source(self, part: str, now: float) -> str | None:
         """Whose word on this part counts; None: nobody knows."""
         givers = [source for source in self._sources if part in self._words[source]]
+        if part in _ESTIMATED and self._vote.outvoted:
+            givers = self._not_outvoted(part, givers)
         for source in givers:
             if now - self._words[source][part].received <= _FRESH_SOONER.get(part, FRESH):
                 return source
         return max(givers, key=lambda one: self._words[one][part].received, default=None)
+
+    def _not_outvoted(self, part: str, givers: list[str]) -> list[str]:
+        """Those that count beside an estimate that is wrong; an attitude that nobody else tells
+        stays, and its error, which only that estimate tells, does not."""
+        sound = [one for one in givers if one not in self._vote.outvoted]
+        return givers if part == "attitude" and not sound else sound
 
     def _autopilot(self, now: float) -> tuple[LinkState, int]:
         """State of the link to the autopilot by the source that hears it best, and its MAV_STATE.
@@ -298,7 +316,8 @@ class VehicleMerge:
         told = VEHICLE_STATE in self._sources
         lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
         faults = () if lost else self._vehicle.faults
-        return (*faults, *self._missing(now), *self._slow(now), *self._apart(now))
+        wrong = self._vote.outvoted.values()
+        return (*faults, *self._missing(now), *self._slow(now), *wrong, *self._apart(now))
 
     def _apart(self, now: float) -> list[str]:
         """Sources of a vehicle with its motors off that differ as no two sound ones do: in flight
@@ -317,8 +336,8 @@ class VehicleMerge:
             if words and max(words.values()) - min(words.values()) > most:
                 each = ", ".join(f"{one} {value:.1f}" for one, value in words.items())
                 told.append(
-                    f"{part.replace('_', ' ')} differs while the vehicle stands: {each} {unit} "
-                    f"(at most {most:g} apart): turn or calibrate one, or take it out of "
+                    f"{part.replace('_', ' ')} differs with the motors reported off: {each} "
+                    f"{unit} (at most {most:g} apart): turn or calibrate one, or take it out of "
                     "vehicle_sources"
                 )
         return told

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from chute_ros.model import Action, Outcome
+from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_details, deploy_reached, end_kill, finish_deploy
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.gate import OPERATOR, too_low
 from chute_ros.supervisor.machine import Event, Stage, listed
-from chute_ros.supervisor.orders import order_deploy
+from chute_ros.supervisor.orders import armed_since, order_deploy, order_kill
 from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.policy import put_off
 from chute_ros.supervisor.quick_replace import replace
@@ -58,6 +58,8 @@ def check_kill(turn: Turn) -> None:
     if kill is None:
         return
     end_kill(turn)
+    if turn.state.stage is Stage.DEPLOYED and turn.flight.airborne:
+        _kill_again(turn, kill)
     if turn.state.stage is not Stage.KILLING or not turn.deploying.deploy_rule:
         return
     if kill.confirmed or turn.now >= release_due(turn.config, turn.state, turn.now):
@@ -78,6 +80,16 @@ def check_kill(turn: Turn) -> None:
         limit = _limit(turn, kill)
         turn.move(Event.DEPLOY_DUE, why)
         _fire(turn, f"{why} ({limit})")
+
+
+def _kill_again(turn: Turn, kill: Pending) -> None:
+    """Motors that were off, and armed again by anybody: they wind up the canopy's lines. (An
+    autopilot that terminates the flight may say ARMED all the time.)"""
+    was_off = turn.before.heard.vehicle.armed is Armed.DISARMED
+    if was_off and kill.confirmed and armed_since(turn, kill):
+        why = "the motors were armed again under a canopy that is out"
+        turn.alarm(f"{why}: they are stopped once more")
+        order_kill(turn, "armed under the canopy", (why,))
 
 
 def _limit(turn: Turn, kill: Pending) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from chute_ros.model import VehicleState
+from chute_ros.model import VehicleState, pressure_altitude
 from chute_ros.supervisor.measured import Sample
 from chute_ros.supervisor.measurements import DEGREES
 
@@ -50,14 +50,6 @@ def _sink_beyond_target(vehicle: VehicleState) -> tuple[float, float]:
         missed = vehicle.below_target > _MISSES_TARGET
         value = -vehicle.vertical_speed if missed else math.nan
     return value, max(vehicle.target_age, vehicle.vertical_speed_age)
-
-
-def pressure_altitude(pressure: float) -> float:
-    """Height at which the standard atmosphere has this pressure (Pa), m (ICAO Doc 7488, below
-    11 km); NaN: it is no pressure."""
-    if not 1000.0 <= pressure <= 120_000.0:
-        return math.nan
-    return 44_330.77 * (1.0 - math.pow(pressure / 101_325.0, 0.190263))
 
 
 def distance_between(one: tuple[float, float], other: tuple[float, float]) -> float:

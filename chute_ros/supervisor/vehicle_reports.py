@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from types import MappingProxyType
 
-from chute_ros.model import Armed, VehicleState
+from chute_ros.model import Armed, VehicleState, pressure_altitude
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.contradictions import commanded, denials, height_denied, noted
@@ -21,7 +21,7 @@ from chute_ros.supervisor.measurements import (
     VERTICAL_SPEED,
 )
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.samples import pressure_altitude, samples_of
+from chute_ros.supervisor.samples import samples_of
 from chute_ros.supervisor.state import CONTRADICTED_FOR
 from chute_ros.supervisor.turn import Turn
 

@@ -123,7 +123,7 @@ def test_a_source_that_is_mounted_wrong_is_named_while_the_vehicle_stands(
     )  # fmt: skip
     one.hear("imu", {part: values}, 10.0)
     named = [text.split(" apart): turn")[0] for text in one.state(10.1).faults]
-    what = f"{part.replace('_', ' ')} differs while the vehicle stands: vehicle/state {told}"
+    what = f"{part.replace('_', ' ')} differs with the motors reported off: vehicle/state {told}"
     assert named == ([what] if told and armed is Armed.DISARMED else [])
 
 

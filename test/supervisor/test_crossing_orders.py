@@ -402,6 +402,32 @@ def test_under_an_open_canopy_the_motors_stop_whatever_starts_or_is_wrong_meanwh
         assert len(story.decisions(K)) == 1
 
 
+def test_motors_that_are_armed_again_under_a_canopy_are_stopped_again() -> None:
+    story = Story().deploying()
+    story.at(1.2, OUT, story.report(K, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.DEPLOYED
+    off = replace(FLYING, armed=Armed.DISARMED)
+    for t in (1.3, 1.8, 2.3):
+        story.at(t, OUT, i.VehicleReport(off))
+    assert len(story.decisions(K)) == 1
+    for t in (2.5, 2.6, 2.7):
+        story.at(t, OUT, i.VehicleReport(FLYING))
+    assert len(story.decisions(K)) == 2, "once for each time that they are armed"
+    assert story.state.stage is Stage.DEPLOYED
+    assert len(story.decisions(D)) == 1
+    assert "armed again under a canopy that is out" in story.alarms()[-1]
+    story.at(2.8, OUT, i.VehicleReport(off), story.report(K, Outcome.CONFIRMED))
+    story.at(3.3, OUT, i.VehicleReport(FLYING))
+    assert len(story.decisions(K)) == 3
+
+
+def test_an_armed_state_of_before_the_kill_stops_no_motors_twice() -> None:
+    story = Story().deploying()
+    story.at(1.2, OUT, story.report(K, Outcome.CONFIRMED), i.VehicleReport(FLYING))
+    story.at(1.4, OUT, i.VehicleReport(replace(FLYING, armed_age=0.35)))
+    assert len(story.decisions(K)) == 1
+
+
 def test_a_forced_test_on_the_ground_is_not_answered_by_what_was_out_before() -> None:
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False), OUT)
