@@ -162,8 +162,8 @@ class Session(Generic[BenchT]):
         for number, clause in enumerate(self._clauses, start=1):
             if not problem and (yield from self._silent()):
                 problem = f"the device fell silent{before}"
-            if problem:
-                self._events.append(Result(clause, Verdict.NOT_TRIED, problem, (), 0.0))
+            if why := problem or self._forbidden(clause):
+                self._events.append(Result(clause, Verdict.NOT_TRIED, why, (), 0.0))
                 continue
             before = f" as {clause.name} was tried"
             self._events.append(Trying(clause, number, len(self._clauses)))
@@ -181,13 +181,17 @@ class Session(Generic[BenchT]):
         heard = self.bench.heard_at
         return not (yield Wait(self.bench.now + _SILENCE, lambda: self.bench.heard_at > heard))
 
+    def _forbidden(self, clause: Clause[BenchT]) -> str:
+        """What the person has not allowed of it; empty: nothing."""
+        if clause.risk > self._allowed.risk:
+            return f"it takes {clause.risk.option}"
+        if clause.needs and clause.needs not in self._allowed.options:
+            return f"it takes {clause.needs}"
+        return ""
+
     def _tried(
         self, clause: Clause[BenchT]
     ) -> Generator[Wait, bool, tuple[Verdict, str, tuple[Packet, ...]]]:
-        if clause.risk > self._allowed.risk:
-            return Verdict.NOT_TRIED, f"it takes {clause.risk.option}", ()
-        if clause.needs and clause.needs not in self._allowed.options:
-            return Verdict.NOT_TRIED, f"it takes {clause.needs}", ()
         try:
             why = yield from clause.trial(self.bench)
         except DecidedError as decided:

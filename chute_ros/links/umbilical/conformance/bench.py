@@ -226,7 +226,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
     # -- steps of trials --------------------------------------------------------------------------
 
     def find(self) -> Trial:
-        """Who sends $TELEM, and in which flight mode."""
+        """What sends $TELEM, by its layout."""
         began = self.now
         yield Wait(began + _FOUND_WITHIN, lambda: any(one.kind == TELEM for one in self.heard))
         lines = [one for one in self.heard if one.kind == TELEM]
@@ -237,12 +237,12 @@ class UmbilicalBench(RecordingBench[HeardLine]):
                 "check the port, and that no other program reads it"
             )
         self._is_found = True
-        mode = lines[0].values.get("flight_mode")
-        return f"{self.layout.name}, {mode_name(mode)}"
+        return f"flight computer ({self.layout.name})"
 
     def identity(self) -> Mapping[str, str]:
-        """A flight computer tells no name: its layout, and what its flash holds."""
-        told = {"layout": f"{self.layout.name} ({self.layout.count} fields)"}
+        """A flight computer tells no name: its flight mode as it was found, and its flash."""
+        modes = (one.values["flight_mode"] for one in self.heard if "flight_mode" in one.values)
+        told = {"found in": mode_name(next(modes, None))} if self._is_found else {}
         used = [one.said for one in self.heard if isinstance(one.said, FlashUsage)]
         if used:
             told["flash"] = f"{used[0].used} of {used[0].total} KB used"

@@ -121,7 +121,7 @@ def _valve(valve: str, is_open: int) -> UmbilicalClause:
         return (yield from _moves(bench, order, f"{valve}_open", is_open))
 
     token, name = KINDS[order].command.token.decode(), _VALVES[valve]
-    does = f"IT OPENS THE {name}"
+    does = f"IT OPENS THE {name}" + ("" if is_open else ", and closes it")
     text = f"{token} {word}s the {name}, and nothing else"
     return _core(f"{word}-{valve}", text, trial, does, Risk.FIRES)
 

@@ -33,6 +33,7 @@ _BEATS = 5
 _HERE, _THERE = (42.441913, -76.4878), (-56.5, 78.65)
 _AIMS = "its target is changed, and set back in the end if it had one"
 _MUST_NOT = "it must do nothing"
+_UNHEARD_DOES = "no <H> is sent for 18 s: some firmware opens the SV then, to vent the tank"
 _HARMLESS = tuple(f"<{one}>".encode() for one in ("Q", "Z", "QQ", "", "?"))
 #: No command is in any of them, whatever a device takes for a bracket or a letter.
 _NOISE = (b">>;", bytes([0, 255, 27, 7, 8, 255, 0, 254]), bytes(range(128, 192)) * 2)
@@ -238,13 +239,15 @@ CLAUSES: tuple[UmbilicalClause, ...] = (
         "heartbeat-timeout",
         "without <H> for typically 15 s the connection counts as lost, not before",
         _timeout,
-        "no <H> is sent for 18 s: some firmware opens the SV then, to vent the tank",
+        _UNHEARD_DOES,
+        Risk.ARMS,
     ),
     _beats(
         "unconnected",
         "the umbilical runs independently: without <H> telemetry goes on",
         _goes_on,
-        READS,
+        _UNHEARD_DOES,
+        Risk.ARMS,
     ),
     _aim("target", "<T,lat,lon> sets the target, which telemetry shows", _target, _AIMS),
     _aim("target-range", "what is no latitude or longitude sets no target", _no_place, _AIMS),
