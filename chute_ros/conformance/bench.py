@@ -35,13 +35,21 @@ class RecordingBench(Generic[HeardT]):
         self.traffic: list[Packet] = []
         self.heard: list[HeardT] = []
         self.watched: list[HeardT] = []
-        self._began = math.nan
+        #: How often the device was seen to start anew.
+        self.starts = 0
+        self._began = self._up = math.nan
 
     def at(self, now: float) -> None:
         """The time is now, monotonic s."""
         self.now = now
         if math.isnan(self._began):
             self._began = now
+
+    def device_is_up(self, since_start: float, wraps: float) -> None:
+        """The device tells the time since its start, which begins again at 0 after this much."""
+        if 0.0 < self._up - since_start < wraps / 2.0:
+            self.starts += 1
+        self._up = since_start
 
     def noted(self, sent: bool, sender: str, name: str, text: str, raw: bytes) -> Packet:
         """Remember what was sent or received."""

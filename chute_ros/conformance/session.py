@@ -26,6 +26,8 @@ class Bench(Protocol):
     #: When the device was heard last, monotonic s.
     heard_at: float
     traffic: list[Packet]
+    #: How often it was seen to start anew.
+    starts: int
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         """Take in bytes."""
@@ -158,7 +160,7 @@ class Session(Generic[BenchT]):
             self._events.append(Ended(str(decided)))
             return
         self._events.append(Found(who))
-        problem, before = "", ""
+        problem, before, starts = "", "", self.bench.starts
         for number, clause in enumerate(self._clauses, start=1):
             if not problem and (yield from self._silent()):
                 problem = f"the device fell silent{before}"
@@ -169,6 +171,10 @@ class Session(Generic[BenchT]):
             self._events.append(Trying(clause, number, len(self._clauses)))
             began, first = self.bench.now, len(self.bench.traffic)
             verdict, why, proof = yield from self._tried(clause)
+            restarted = self.bench.starts > starts and not clause.restarts
+            if restarted and verdict is not Verdict.FAILED:
+                verdict, why = Verdict.FAILED, f"it started anew meanwhile ({why})"
+            starts = self.bench.starts
             shown = proof or tuple(self.bench.traffic[first:])
             took = self.bench.now - began
             self._events.append(Result(clause, verdict, why, shown, took))

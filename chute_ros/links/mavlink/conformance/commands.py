@@ -26,6 +26,8 @@ _SILENCE = 0.6
 _OTHER_SENDER, _NOBODY = 190, 77
 #: Bytes without a start of a frame.
 _NOISE = bytes(byte for byte in range(256) if byte not in (0xFD, 0xFE)) * 4
+#: So many frames of ours are lost in a row: the number of a frame is one byte.
+_LOST = (1, 7, 128)
 KEY = "--signing-key-file"
 
 
@@ -114,6 +116,15 @@ def _doubled(bench: MavlinkBench) -> Trial:
     if (yield from bench.command(_REQUEST, _STATUS, tries=1)) is None:
         raise failed("after a frame that came twice the next is not answered")
     return "answered, and the next one, too"
+
+
+def _lost(bench: MavlinkBench) -> Trial:
+    for count in _LOST:
+        for _ in range(count):
+            bench.send(bench.command_long(_REQUEST, _STATUS), change=lambda frame: ())
+        if (yield from bench.command(_REQUEST, _STATUS)) is None:
+            raise failed(f"after {count} frames that were lost a command is not answered, 3 times")
+    return "answered after each gap"
 
 
 def _reordered(bench: MavlinkBench) -> Trial:
@@ -245,6 +256,7 @@ CLAUSES: tuple[MavlinkClause, ...] = (
         _sent_again,
     ),
     _frames("doubled-frame", "a frame that comes twice does no harm", _doubled),
+    _frames("lost-frames", "frames that are lost before it do no harm", _lost),
     _frames("reordered-frames", "frames that overtake each other are both taken", _reordered),
     _frames("noise", "bytes that are no frame do no harm", _noise),
     _frames("damaged-frame", "a frame with a wrong checksum is not taken", _damaged),

@@ -165,6 +165,8 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         whole = data.startswith(b"$TELEM,")
         fields = {"whole": whole, "texts": texts, "values": values, "problems": problems}
         self._keep(TELEM, said.body, data, said=said, **fields)
+        if BOOT in values:
+            self.device_is_up(values[BOOT], 2.0**32)
 
     def _fields(self, body: str, texts: list[str]) -> tuple[dict[str, Value], dict[str, str]]:
         decoded = self.layout.decode(body)

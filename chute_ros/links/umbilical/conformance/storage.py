@@ -221,7 +221,9 @@ CLAUSES: tuple[UmbilicalClause, ...] = (
     _stores("dump-flash", "<G> dumps the flash", _dump_flash, _DUMPS),
     _tells("dump-interrupts", "a dump of the flash interrupts $TELEM", _interrupts, READS),
     _tells("dump-resumes", "after the dump $TELEM goes on", _resumes, READS),
-    _stores("reboot", "<R> reboots it, into Startup", _restart, _RESTARTS, needs=REBOOT),
+    _stores(
+        "reboot", "<R> reboots it, into Startup", _restart, _RESTARTS, needs=REBOOT, restarts=True
+    ),
 )
 #: What wipes comes after what fills.
 WIPES: tuple[UmbilicalClause, ...] = (
@@ -233,5 +235,6 @@ WIPES: tuple[UmbilicalClause, ...] = (
         _wipe_and_reboot,
         f"{_WIPES}, and restarts",
         needs=WIPE,
+        restarts=True,
     ),
 )

@@ -85,6 +85,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
         if heard.source == self.node:
             self.heard.append(one)
             self.heard_at = now
+            if one.kind == NODE_STATUS:
+                self.device_is_up(one.values["uptime_sec"], 2.0**32)
         if heard.kind is Kind.REQUEST:
             self._answer(heard)
 

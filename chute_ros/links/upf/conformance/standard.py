@@ -382,7 +382,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _restart_refused,
         "it must not, but it may restart",
     ),
-    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS),
+    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS, restarts=True),
     clause(
         _STATES,
         "block-at-start",
@@ -403,6 +403,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         "with Enable Auto-Save off only ExecuteOpcode keeps a change",
         _kept_by_opcode,
         "a parameter is changed, it restarts twice, and it is set back",
+        restarts=True,
     ),
     clause(
         "Over hours",
