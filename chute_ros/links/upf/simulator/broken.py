@@ -43,8 +43,8 @@ class BrokenController(UpfController):
     def __init__(
         self, definitions: Definitions, settings: ControllerSettings, breaks: str
     ) -> None:
-        super().__init__(definitions, settings)
         self.breaks = breaks
+        super().__init__(definitions, settings)
         self._first_start = self._ready_since = math.nan
         if change := _CHANGES.get(breaks):
             change(self)
@@ -53,6 +53,19 @@ class BrokenController(UpfController):
         if math.isnan(self._first_start):
             self._first_start = now
         super().start(now)
+
+    def reboot(self) -> None:
+        """It keeps the node id that it was given, where it must not."""
+        given = self._dna.node_id
+        super().reboot()
+        if self.breaks == "dna-forgets" and given and not self.node_id:
+            self.endpoint.node_id = given
+
+    def receive(self, data: bytes, now: float) -> None:
+        asked = not self.node_id
+        super().receive(data, now)
+        if self.breaks == "dna" and asked and self.node_id:
+            self.endpoint.node_id -= 1
 
     def take_output(self) -> list[bytes]:
         frames, up = super().take_output(), self.now - self._first_start
@@ -240,5 +253,5 @@ BREAKS = (
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
     *("state-known", "soak", "unknown-type", "no-auto-takeoff", "arm-order"),
-    *("disabled", "deploy", "touchdown"),
+    *("disabled", "deploy", "touchdown", "dna", "dna-forgets"),
 )
