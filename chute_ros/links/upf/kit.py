@@ -9,11 +9,11 @@ from chute_ros.conformance.kit import Kit
 from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import DNA, VEHICLE, UpfBench
 from chute_ros.links.upf.conformance.standard import DOCUMENT
+from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.simulator.broken import simulated_controller
+from chute_ros.links.upf.simulator.broken import simulated_controller, simulated_trigger
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import ControllerSettings
-from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.sim.command_line import number
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
@@ -69,7 +69,9 @@ def _simulated(broken: str, needs: str) -> tuple[UpfBus, UpfBench]:
     """With a trigger, at rest on a bench."""
     definitions = Definitions(load_data_types("", ""))
     controller = simulated_controller(definitions, ControllerSettings(), broken)
-    bus = UpfBus([controller, UpfTrigger(definitions)])
+    bus = UpfBus(
+        [controller, simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)]
+    )
     return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK, dna=needs == DNA)
 
 

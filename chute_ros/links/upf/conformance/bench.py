@@ -14,6 +14,7 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.allocation import Allocator
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
@@ -267,6 +268,17 @@ class UpfBench(RecordingBench[HeardTransfer]):
         service = names.PARACHUTE_SERVICE
         answer = yield from self.call(service, self.definitions.request(service, type_name))
         return None if answer is None else self.definitions.result_name(service, answer)
+
+    def tell_time(self, microseconds: int) -> None:
+        """GlobalTimeSync: the one before was sent at this time; 0: there was none."""
+        values = {"previous_transmission_timestamp_usec": microseconds}
+        self.noted(True, "us", time_sync.MESSAGE, str(microseconds), b"")
+        self._endpoint.broadcast(time_sync.MESSAGE, values)
+
+    def triggers(self) -> list[int]:
+        """The nodes that have told the state of a trigger."""
+        told = {one.transfer.source for one in self.every if one.kind == names.TRIGGER_STATUS}
+        return sorted(told)
 
     def get(self, name: str = "", index: int = 0) -> Any:
         """The response of GetSet (its values); None: not answered."""
