@@ -64,6 +64,13 @@ class RecordingBench(Generic[HeardT]):
         self.watched = [one for one in self.heard if one.at >= began]
         return ""
 
+    def watch_once(self, seconds: float) -> Trial:
+        """The same, unless something was watched before: for a clause that looks at what another
+        one has watched, and may be tried without it."""
+        if not self.watched:
+            yield from self.watch(seconds)
+        return ""
+
     def watch_on(self, seconds: float) -> Trial:
         """Let so long pass."""
         yield Wait(self.now + seconds)

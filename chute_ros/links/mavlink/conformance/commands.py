@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from chute_ros.conformance.clause import READS, SOAK, Trial, Wait, failed, not_supported, not_tried
 from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
-from chute_ros.links.mavlink.conformance.connection import nominal
+from chute_ros.links.mavlink.conformance.connection import WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import (
     COMMAND,
     FRAMES,
@@ -177,7 +177,7 @@ def _cut(bench: MavlinkBench) -> Trial:
 
 
 def _mavlink_2(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     for one in bench.watched:
         if one.frame.version != 2:
             raise failed(f"{one.kind} came as MAVLink {one.frame.version}", [one.packet])
@@ -197,7 +197,7 @@ def _mavlink_1(bench: MavlinkBench) -> Trial:
 
 
 def _sequence(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     for before, after in pairwise(bench.watched):
         if after.frame.sequence != (before.frame.sequence + 1) % 256:
             numbers = f"{before.frame.sequence} is followed by {after.frame.sequence}"

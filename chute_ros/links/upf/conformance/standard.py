@@ -104,7 +104,7 @@ def _statistics(bench: UpfBench) -> Trial:
 
 
 def _uptime(bench: UpfBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     told = _node_statuses(bench)
     if len(told) < 2:
         raise not_tried("NodeStatus came too seldom")
@@ -121,6 +121,7 @@ def _status_interval(bench: UpfBench) -> Trial:
     told = yield from bench.value(p.PARACHUTE_STATUS_INTERVAL)
     if not isinstance(told, (int, float)) or isinstance(told, bool):
         raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
+    yield from bench.watch_once(WATCHED)
     mean = _mean(bench, names.PARACHUTE_STATUS)
     if abs(mean - told / 1000.0) > max(_SHARE * told / 1000.0, _LEAST):
         packets = bench.packets(names.PARACHUTE_STATUS)
@@ -333,6 +334,7 @@ def _after_restart(bench: UpfBench, name: str) -> Trial:
 
 
 def _time_sync(bench: UpfBench) -> Trial:
+    yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
     before = yield from bench.state()
     bench.tell_time(0)
     for number in range(3):
