@@ -17,10 +17,13 @@ _LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
 def write(nodes: Sequence[Node]) -> None:
     """From the rows of the FMEA."""
     failures = of_kind(nodes, "FAILURE_MODE")
-    stay = [one for one in failures if one.get("STAYS")]
+    # What takes a stranger comes last: it has one answer, and hides the others.
+    stay = sorted(
+        (one for one in failures if one.get("STAYS")), key=lambda one: one["TITLE"] == "forged"
+    )
     rows = [
         (
-            f"{one['SECTION']}: **{one['TITLE']}**\n\n[LINK: {one['UID']}]",
+            f"{one['SECTION']}: **{one['TITLE']}**\n\n[LINK: {one['UID']}, {one['UID']}]",
             "\n\n".join(_LEADS[word.strip()] for word in one["SINGLE"].split(",")),
             _line(one["STATEMENT"]),
             _line(one["STAYS"]),

@@ -35,13 +35,21 @@ class RecordingBench(Generic[HeardT]):
         self.traffic: list[Packet] = []
         self.heard: list[HeardT] = []
         self.watched: list[HeardT] = []
-        self._began = math.nan
+        #: How often the device was seen to start anew.
+        self.starts = 0
+        self._began = self._up = math.nan
 
     def at(self, now: float) -> None:
         """The time is now, monotonic s."""
         self.now = now
         if math.isnan(self._began):
             self._began = now
+
+    def device_is_up(self, since_start: float, wraps: float) -> None:
+        """The device tells the time since its start, which begins again at 0 after this much."""
+        if 0.0 < self._up - since_start < wraps / 2.0:
+            self.starts += 1
+        self._up = since_start
 
     def noted(self, sent: bool, sender: str, name: str, text: str, raw: bytes) -> Packet:
         """Remember what was sent or received."""
@@ -54,6 +62,13 @@ class RecordingBench(Generic[HeardT]):
         began = self.now
         yield Wait(began + seconds)
         self.watched = [one for one in self.heard if one.at >= began]
+        return ""
+
+    def watch_once(self, seconds: float) -> Trial:
+        """The same, unless something was watched before: for a clause that looks at what another
+        one has watched, and may be tried without it."""
+        if not self.watched:
+            yield from self.watch(seconds)
         return ""
 
     def watch_on(self, seconds: float) -> Trial:

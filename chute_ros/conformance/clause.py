@@ -93,7 +93,8 @@ READS, ASKS = "nothing: it is only listened to", "nothing: it is only asked for 
 class Clause(Generic[BenchT]):
     """In the order in which a document is read. document, section: where text stands, in the words
     of the document; name: without spaces, for command lines; does: what the device may do
-    meanwhile; needs: an option without which it is not tried."""
+    meanwhile; needs: an option without which it is not tried; restarts: the device is told to
+    start anew, which else fails the clause."""
 
     document: str
     section: str
@@ -103,6 +104,7 @@ class Clause(Generic[BenchT]):
     does: str = ASKS
     risk: Risk = Risk.NONE
     needs: str = ""
+    restarts: bool = False
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ class Bench(Protocol):
     #: When the device was heard last, monotonic s.
     heard_at: float
     traffic: list[Packet]
+    #: How often it was seen to start anew.
+    starts: int
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         """Take in bytes."""
@@ -158,17 +160,21 @@ class Session(Generic[BenchT]):
             self._events.append(Ended(str(decided)))
             return
         self._events.append(Found(who))
-        problem, before = "", ""
+        problem, before, starts = "", "", self.bench.starts
         for number, clause in enumerate(self._clauses, start=1):
             if not problem and (yield from self._silent()):
                 problem = f"the device fell silent{before}"
-            if problem:
-                self._events.append(Result(clause, Verdict.NOT_TRIED, problem, (), 0.0))
+            if why := problem or self._forbidden(clause):
+                self._events.append(Result(clause, Verdict.NOT_TRIED, why, (), 0.0))
                 continue
             before = f" as {clause.name} was tried"
             self._events.append(Trying(clause, number, len(self._clauses)))
             began, first = self.bench.now, len(self.bench.traffic)
             verdict, why, proof = yield from self._tried(clause)
+            restarted = self.bench.starts > starts and not clause.restarts
+            if restarted and verdict is not Verdict.FAILED:
+                verdict, why = Verdict.FAILED, f"it started anew meanwhile ({why})"
+            starts = self.bench.starts
             shown = proof or tuple(self.bench.traffic[first:])
             took = self.bench.now - began
             self._events.append(Result(clause, verdict, why, shown, took))
@@ -181,13 +187,17 @@ class Session(Generic[BenchT]):
         heard = self.bench.heard_at
         return not (yield Wait(self.bench.now + _SILENCE, lambda: self.bench.heard_at > heard))
 
+    def _forbidden(self, clause: Clause[BenchT]) -> str:
+        """What the person has not allowed of it; empty: nothing."""
+        if clause.risk > self._allowed.risk:
+            return f"it takes {clause.risk.option}"
+        if clause.needs and clause.needs not in self._allowed.options:
+            return f"it takes {clause.needs}"
+        return ""
+
     def _tried(
         self, clause: Clause[BenchT]
     ) -> Generator[Wait, bool, tuple[Verdict, str, tuple[Packet, ...]]]:
-        if clause.risk > self._allowed.risk:
-            return Verdict.NOT_TRIED, f"it takes {clause.risk.option}", ()
-        if clause.needs and clause.needs not in self._allowed.options:
-            return Verdict.NOT_TRIED, f"it takes {clause.needs}", ()
         try:
             why = yield from clause.trial(self.bench)
         except DecidedError as decided:

@@ -80,15 +80,6 @@ def _in_short(result: Result) -> str:
     saved = [one for one in result.plain if math.isfinite(one.bound)]
     lost = [one for one in result.plain if not math.isfinite(one.bound)]
     words = []
-    if saved:
-        worst = max(saved, key=lambda one: one.bound)
-        words.append(
-            f"With {_percent(CONFIDENCE)} confidence **{math.ceil(worst.bound)} m above the "
-            f"ground are enough** for at least {_percent(worst.share)} of each failure in the "
-            "table"
-            + (", but for those named next." if lost else ".")
-            + f" The failure that needs the most is: {_name(worst)}."
-        )
     if lost:
         told = (
             f"{_name(one)} ({sum(map(math.isinf, one.needed))} of {len(one.needed)} were not "
@@ -96,6 +87,14 @@ def _in_short(result: Result) -> str:
             for one in lost
         )
         words.append(f"**No height is enough for:** {'; '.join(told)}.")
+    if saved:
+        worst = max(saved, key=lambda one: one.bound)
+        words.append(
+            f"With {_percent(CONFIDENCE)} confidence **{math.ceil(worst.bound)} m above the "
+            f"ground are enough** for at least {_percent(worst.share)} of each other failure in "
+            f"the table ({result.campaign.flights} flights of each). The failure that needs the "
+            f"most is: {_name(worst)}."
+        )
     return " ".join(words)
 
 
@@ -209,7 +208,7 @@ def _name(found: Found) -> str:
 
 
 def _share(found: Found) -> str:
-    return _percent(found.share)
+    return _percent(found.share) if math.isfinite(found.bound) else ""
 
 
 def _percent(share: float) -> str:

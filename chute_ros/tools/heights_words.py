@@ -53,7 +53,8 @@ ASSUMPTIONS = f"""\
   than softly, is noticed late, and needs more height.
 - **Failure**: sudden and complete, in steady flight for {FLOWN_BEFORE:g} s and more. Each number
   that has a range is drawn from it, each as likely; sinks that the description leaves out are
-  drawn like the campaign's.
+  drawn like the campaign's. An autopilot that restarts reports again at once, and rightly: a real
+  one needs a second and more, and its estimate longer, in which nothing is seen.
 - **Ground**: level with the take-off. Over higher ground the height above it counts; the rules'
   `minimum_height` is above the take-off.
 - **Chain**: one supervisor with its parameters as delivered, one computer that is never late, no

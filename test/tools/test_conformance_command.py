@@ -12,26 +12,13 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from conformance_processes import COMMAND, started
 from junitparser import JUnitXml
 from mcap.reader import make_reader
 
-ROOT = Path(__file__).parents[2]
-COMMAND = [sys.executable, "-u", "-m", "chute_ros.tools.conformance"]
 SIMULATOR = [sys.executable, "-u", "-m"]
 SIMULATOR += ["chute_ros.links.mavlink.simulator.sim_mavlink_parachute"]
 QUICK = ["--only", "request-status", "unknown-command"]
-
-
-@contextmanager
-def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A process that is gone afterwards."""
-    pipe = subprocess.PIPE
-    one = subprocess.Popen(arguments, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT)
-    with one:
-        try:
-            yield one
-        finally:
-            one.kill()
 
 
 def free_port() -> int:

@@ -39,4 +39,6 @@ LINK = LinkKind(
     simulators=_simulators,
     connection=lambda sockets: f"serial:{sockets.terminal}",
     part=f"{_FOLDER}.virtual:UmbilicalPart",
+    device=_NAME,
+    kit=f"{_FOLDER}.kit:KIT",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import yaml
@@ -28,6 +29,27 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
     if len(set(names)) != len(names):
         raise ParameterError(f"{named} is {folder!r}: two layouts have one name: {names}")
     return sorted(layouts, key=lambda layout: layout.name != REFERENCE_LAYOUT)
+
+
+def add_layout_options(options: ArgumentParser) -> None:
+    """Options of a command that takes one layout."""
+    options.add_argument(
+        "--layout",
+        default=REFERENCE_LAYOUT,
+        metavar="NAME",
+        help=f"of the $TELEM line (default: {REFERENCE_LAYOUT})",
+    )
+    options.add_argument(
+        "--telem-path", default="", metavar="FOLDER", help="with other layouts (*.yaml)"
+    )
+
+
+def chosen_layout(chosen: Namespace) -> Layout:
+    """The layout that these options name; ParameterError if there is none."""
+    layouts = {layout.name: layout for layout in load_layouts(chosen.telem_path, "--telem-path")}
+    if chosen.layout not in layouts:
+        raise ParameterError(f"--layout {chosen.layout!r}: need one of {', '.join(layouts)}")
+    return layouts[chosen.layout]
 
 
 def _load(file: Path, named: str) -> Layout:

@@ -7,13 +7,13 @@ from argparse import ArgumentParser, Namespace
 from chute_ros.conformance.clause import Risk
 from chute_ros.conformance.kit import Kit
 from chute_ros.links.upf.conformance import CLAUSES
-from chute_ros.links.upf.conformance.bench import VEHICLE, UpfBench
+from chute_ros.links.upf.conformance.bench import DNA, VEHICLE, UpfBench
 from chute_ros.links.upf.conformance.standard import DOCUMENT
+from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.simulator.broken import simulated_controller
+from chute_ros.links.upf.simulator.broken import simulated_controller, simulated_trigger
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import ControllerSettings
-from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.sim.command_line import number
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
@@ -48,25 +48,31 @@ def _add_options(options: ArgumentParser) -> None:
         help="of the bus",
     )
     options.add_argument(
+        DNA, action="store_true", help="try a node id that is given out, in place of its own"
+    )
+    options.add_argument(
         "--dsdl-path", default="", metavar="FOLDER", help="the vendor's data types (flyfire)"
     )
 
 
 def _bench(chosen: Namespace, risk: Risk) -> UpfBench:
     definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
-    return UpfBench(definitions, risk, chosen.node, chosen.vehicle_node, chosen.soak or 0.0)
+    soak = chosen.soak or 0.0
+    return UpfBench(definitions, risk, chosen.node, chosen.vehicle_node, soak, chosen.dna)
 
 
 def _wire(chosen: Namespace) -> Wire:
     return make_can_wire(parse_can_address(chosen.connection, chosen.bitrate))
 
 
-def _simulated(broken: str, _: str) -> tuple[UpfBus, UpfBench]:
+def _simulated(broken: str, needs: str) -> tuple[UpfBus, UpfBench]:
     """With a trigger, at rest on a bench."""
     definitions = Definitions(load_data_types("", ""))
     controller = simulated_controller(definitions, ControllerSettings(), broken)
-    bus = UpfBus([controller, UpfTrigger(definitions)])
-    return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK)
+    bus = UpfBus(
+        [controller, simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)]
+    )
+    return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK, dna=needs == DNA)
 
 
 KIT = Kit(

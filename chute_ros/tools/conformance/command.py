@@ -259,7 +259,7 @@ def _line(event: Any) -> str:
     """What is told of it; empty: nothing."""
     if isinstance(event, Found):
         return f"found {plain(event.text)}"
-    if isinstance(event, Trying) and event.clause.risk is not Risk.NONE:
+    if isinstance(event, Trying) and (event.clause.risk is not Risk.NONE or event.clause.needs):
         return f"  [{event.number}/{event.of}] {event.clause.name}: {event.clause.does}"
     if isinstance(event, Result):
         name, why = event.clause.name, plain(event.why)

@@ -46,7 +46,8 @@ def page(report: Report) -> str:
 
 def _row(one: Result) -> tuple[str, ...]:
     verdict = f'<b class="{_TONES[one.verdict]}">{escaped(one.verdict.value)}</b>'
-    clause = f'<a href="#{escaped(one.clause.name)}">{escaped(one.clause.name)}</a>'
+    name = escaped(one.clause.name)
+    clause = f'<a href="#{name}">{name}</a>' if one.proof else name
     source = f'<span class="dim">{escaped(one.clause.document)}, "{escaped(one.clause.section)}"'
     return (
         cell(verdict),

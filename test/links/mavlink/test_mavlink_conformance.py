@@ -262,6 +262,18 @@ def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
     assert run.problem.startswith(told)
 
 
+def test_a_device_that_starts_anew_in_the_middle_fails_the_clause_that_was_tried() -> None:
+    """Given one that is switched off and on while it is listened to."""
+    device = sound()
+    run = Run(device, Risk.NONE)
+    run.to(lambda: "noise" in run.results)
+    device.act("reboot")
+    run.to()
+    (failed,) = run.of(Verdict.FAILED)
+    assert run.results[failed].why.startswith("it started anew meanwhile (")
+    assert run.problem == ""
+
+
 def test_where_no_parachute_is_heard_it_tells_who_is() -> None:
     device = sound(component_id=42)
     device.streams[dialect.MAVLINK_MSG_ID_HEARTBEAT] = lambda: dialect.MAVLink_heartbeat_message(

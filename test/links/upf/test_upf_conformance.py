@@ -11,15 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import Result, Risk, Verdict
+from chute_ros.conformance.clause import SOAK, Result, Risk, Verdict
 from chute_ros.conformance.session import Allowed, Ended, Session
 from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.upf.conformance import CLAUSES
-from chute_ros.links.upf.conformance.bench import UpfBench
+from chute_ros.links.upf.conformance.bench import DNA, UpfBench
 from chute_ros.links.upf.kit import KIT
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.broken import BREAKS
 from chute_ros.links.upf.simulator.bus import UpfBus
@@ -66,9 +67,12 @@ def simulated(broken: str) -> VirtualLine:
     return line
 
 
-def test_a_sound_controller_passes_all() -> None:
-    line = simulated("")
-    assert of(line, Verdict.PASSED) == NAMES
+@pytest.mark.parametrize("needs", [SOAK, DNA])
+def test_a_sound_controller_passes_all_that_is_allowed(needs: str) -> None:
+    device, bench = KIT.simulated("", needs)
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, (needs,))), device)
+    line.run()
+    assert of(line, Verdict.PASSED) == [one.name for one in CLAUSES if one.needs in ("", needs)]
     assert problem(line) == ""
 
 
@@ -198,6 +202,45 @@ def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
     assert run.controller.state is ParachuteState.READY
     assert run.controller.values == CONTROLLER_PARAMETERS
     assert problem(run.line) == "aborted by Ctrl-C"
+
+
+@pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.1])
+@pytest.mark.parametrize("name", ["dna", "dna-forgets"])
+def test_an_abort_gives_it_its_own_node_id_again(name: str, after: float) -> None:
+    """Given a Ctrl-C so long after its static node id became 0."""
+    device, bench = KIT.simulated("", DNA)
+    clauses = [one for one in CLAUSES if one.name == name]
+    line = VirtualLine(Session(bench, clauses, Allowed(options=(DNA,))), device)
+    assert isinstance(device, UpfBus)
+    controller = device.nodes[0]
+    line.run(lambda: controller.values[p.STATIC_NODE_ID] == 0)
+    until = line.now + after
+    line.run(lambda: line.now >= until)
+    line.session.abort("aborted by Ctrl-C", line.now)
+    line.run()
+    assert problem(line) == "aborted by Ctrl-C"
+    assert controller.node_id == controller.values[p.STATIC_NODE_ID] == CONTROLLER_NODE_ID
+
+
+def test_a_device_that_comes_back_without_a_node_id_is_named() -> None:
+    """Given one that dies while it has none."""
+    device, bench = KIT.simulated("", DNA)
+    clauses = [one for one in CLAUSES if one.name == "dna"]
+    line = VirtualLine(Session(bench, clauses, Allowed(options=(DNA,))), device)
+    assert isinstance(device, UpfBus)
+    line.run(lambda: device.nodes[0].values[p.STATIC_NODE_ID] == 0)
+    device.nodes[0].act("silent")
+    line.run()
+    assert f"{p.STATIC_NODE_ID} is LEFT 0" in problem(line)
+
+
+@pytest.mark.parametrize("risk", list(Risk))
+def test_its_node_id_is_not_taken_unasked(risk: Risk) -> None:
+    bench = UpfBench(DEFINITIONS, risk)
+    bench.at(1.0)
+    values = {"index": 0, "value": p.union_of(0), "name": p.STATIC_NODE_ID.encode()}
+    with pytest.raises(NotAllowedError):
+        next(bench.call(bus_requests.GET_SET, values))
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,8 @@ class MavlinkBench(RecordingBench[Heard]):
             if (frame.system_id, frame.component_id) == (self.system, self.component):
                 self.heard.append(one)
                 self.heard_at = now
+                if one.kind == "PARACHUTE_STATUS":
+                    self.device_is_up(one.message.time_boot_ms, 2.0**32)
 
     def _refusal(self, frame: Frame, raw: bytes) -> str:
         if self._key is None:

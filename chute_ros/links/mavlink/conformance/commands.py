@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from chute_ros.conformance.clause import READS, SOAK, Trial, Wait, failed, not_supported, not_tried
 from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
-from chute_ros.links.mavlink.conformance.connection import nominal
+from chute_ros.links.mavlink.conformance.connection import WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import (
     COMMAND,
     FRAMES,
@@ -26,6 +26,8 @@ _SILENCE = 0.6
 _OTHER_SENDER, _NOBODY = 190, 77
 #: Bytes without a start of a frame.
 _NOISE = bytes(byte for byte in range(256) if byte not in (0xFD, 0xFE)) * 4
+#: So many frames of ours are lost in a row: the number of a frame is one byte.
+_LOST = (1, 7, 128)
 KEY = "--signing-key-file"
 
 
@@ -116,6 +118,15 @@ def _doubled(bench: MavlinkBench) -> Trial:
     return "answered, and the next one, too"
 
 
+def _lost(bench: MavlinkBench) -> Trial:
+    for count in _LOST:
+        for _ in range(count):
+            bench.send(bench.command_long(_REQUEST, _STATUS), change=lambda frame: ())
+        if (yield from bench.command(_REQUEST, _STATUS)) is None:
+            raise failed(f"after {count} frames that were lost a command is not answered, 3 times")
+    return "answered after each gap"
+
+
 def _reordered(bench: MavlinkBench) -> Trial:
     if bench.signs:
         raise not_tried("with a key a frame that was overtaken is a copy, and refused")
@@ -166,7 +177,7 @@ def _cut(bench: MavlinkBench) -> Trial:
 
 
 def _mavlink_2(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     for one in bench.watched:
         if one.frame.version != 2:
             raise failed(f"{one.kind} came as MAVLink {one.frame.version}", [one.packet])
@@ -186,7 +197,7 @@ def _mavlink_1(bench: MavlinkBench) -> Trial:
 
 
 def _sequence(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     for before, after in pairwise(bench.watched):
         if after.frame.sequence != (before.frame.sequence + 1) % 256:
             numbers = f"{before.frame.sequence} is followed by {after.frame.sequence}"
@@ -245,6 +256,7 @@ CLAUSES: tuple[MavlinkClause, ...] = (
         _sent_again,
     ),
     _frames("doubled-frame", "a frame that comes twice does no harm", _doubled),
+    _frames("lost-frames", "frames that are lost before it do no harm", _lost),
     _frames("reordered-frames", "frames that overtake each other are both taken", _reordered),
     _frames("noise", "bytes that are no frame do no harm", _noise),
     _frames("damaged-frame", "a frame with a wrong checksum is not taken", _damaged),

@@ -36,7 +36,7 @@ def nominal(bench: MavlinkBench, kind: str) -> str:
 
 
 def _heartbeat_type(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
     kinds = {one.message.type for one in beats}
     if kinds != {dialect.MAV_TYPE_PARACHUTE}:
@@ -47,7 +47,7 @@ def _heartbeat_type(bench: MavlinkBench) -> Trial:
 
 
 def _heartbeat_fields(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     for one in bench.watched:
         if one.kind != "HEARTBEAT":
             continue

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from chute_ros.conformance.clause import ASKS, READS, Trial, failed, not_supported
 from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, refused, result_of
-from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, nominal
+from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import PARACHUTE, of
 from chute_ros.links.mavlink.protocol.parachute import packed_date
 from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags
@@ -25,7 +25,7 @@ def _statuses(bench: MavlinkBench) -> Iterator[Heard]:
 
 
 def _rate(bench: MavlinkBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     return nominal(bench, "PARACHUTE_STATUS")
 
 

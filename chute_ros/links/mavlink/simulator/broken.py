@@ -24,7 +24,7 @@ _ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
 #: Header of a MAVLink 2 frame, the parameters before the number of a COMMAND_LONG, its number.
 _NUMBER = slice(10 + 28, 10 + 30)
 #: One that is confused by a frame is deaf, or silent, for so long, s.
-_AFTER_DOUBLED, _AFTER_NOISE, _AFTER_CUT, _AFTER_V1 = 0.9, 3.0, 3.3, 4.1
+_AFTER_DOUBLED, _AFTER_LOST, _AFTER_NOISE, _AFTER_CUT, _AFTER_V1 = 0.9, 2.9, 3.0, 3.3, 4.1
 #: It falls silent this long after its start, for so long, s.
 _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
 
@@ -49,6 +49,8 @@ class BrokenParachute(ParachuteDevice):
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         again, self._last, self._understood = data == self._last, data, False
+        if self._breaks == "lost-frames" and self._misses(data):
+            self._deaf_until = now + _AFTER_LOST
         if now >= self._deaf_until and not self._overtaken(data):
             super().receive(data, now, stream)
         mark = data[0] if data else 0
@@ -66,6 +68,13 @@ class BrokenParachute(ParachuteDevice):
     def _answer_all_the_same(self, command: int) -> None:
         if command == _REQUEST:
             self.send(dialect.MAVLink_command_ack_message(command, _ACCEPTED))
+
+    def _misses(self, data: bytes) -> bool:
+        """Half of all numbers of frames are left out before this one of the first sender."""
+        if data[:1] != bytes([MAGIC_V2]) or (data[5], data[6]) != self._first_sender:
+            return False
+        before, self._newest = self._newest, data[4]
+        return before >= 0 and (data[4] - before) % 256 == 129
 
     def _overtaken(self, data: bytes) -> bool:
         if self._breaks != "reordered-frames" or data[:1] != bytes([MAGIC_V2]):
@@ -342,6 +351,7 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
             "command-int",
             "sent-again",
             "doubled-frame",
+            "lost-frames",
             "reordered-frames",
             "noise",
             "damaged-frame",

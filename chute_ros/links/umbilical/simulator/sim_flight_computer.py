@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 
 from chute_ros.errors import ParameterError
-from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.links.umbilical.protocol.layouts import REFERENCE_LAYOUT, Layout
-from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
+from chute_ros.links.umbilical.layout_files import add_layout_options, chosen_layout
+from chute_ros.links.umbilical.simulator.broken import BREAKS, simulated_computer
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 from chute_ros.sim.command_line import main_of, parser_on_pty, run_on_pty, script_of
 
@@ -40,19 +39,20 @@ def _run() -> None:
         "mend (on its pad again, canopies packed), wipe-fails, wipe-hangs, lose-dump-end, "
         "dump-stalls (MODE: Startup, Standby, Ascent, Coast, DrogueDeployed, MainDeployed, Fault)",
     )
-    options.add_argument(
-        "--layout",
-        default=REFERENCE_LAYOUT,
-        metavar="NAME",
-        help=f"of the $TELEM line (default: {REFERENCE_LAYOUT})",
-    )
-    options.add_argument("--telem-path", default="", help="folder with other layouts (*.yaml)")
+    add_layout_options(options)
     for name, unit, text in _NUMBERS:
         default = getattr(start, name.replace("-", "_"))
         text = f"{text} (default: {default:g})"
         options.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=text)
     for name, text in _SWITCHES:
         options.add_argument(f"--{name}", action="store_true", help=text)
+    options.add_argument(
+        "--break",
+        dest="breaks",
+        default="",
+        metavar="CLAUSE",
+        help="it is wrong in this clause of `conformance umbilical` (its --list names them)",
+    )
     chosen = options.parse_args()
     given = [name.replace("-", "_") for name, *_ in (*_NUMBERS, *_SWITCHES)]
     settings = FlightComputerSettings(
@@ -60,15 +60,11 @@ def _run() -> None:
         seed=chosen.seed,
         **{name: getattr(chosen, name) for name in given},
     )
-    layout = _layout(chosen.layout, chosen.telem_path)
-    run_on_pty(FlightComputer(settings, layout, script_of(chosen.at)), chosen)
-
-
-def _layout(name: str, folder: str) -> Layout:
-    layouts = {layout.name: layout for layout in load_layouts(folder, "--telem-path")}
-    if name not in layouts:
-        raise ParameterError(f"--layout {name!r}: need one of {', '.join(layouts)}")
-    return layouts[name]
+    if chosen.breaks and chosen.breaks not in BREAKS:
+        raise ParameterError(f"--break {chosen.breaks!r}: need one of {', '.join(BREAKS)}")
+    script = script_of(chosen.at)
+    device = simulated_computer(settings, chosen_layout(chosen), script, chosen.breaks)
+    run_on_pty(device, chosen)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,9 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan import time_sync
+from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+from chute_ros.protocol.dronecan.allocation import Allocator
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, Kind
 
@@ -28,6 +31,8 @@ ANSWER = 0.5
 TRIES = 3
 #: A state is broadcast at the latest after this, s.
 STATUS_WITHIN = 3.0
+#: The option of clauses that take the device's node id from it, and how long it may be away, s.
+DNA, _AWAY = "--dna", 12.0
 _FIRES = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE", "TYPE_LAUNCH")
 #: Whether these are set may decide whether it fires.
 _HARMLESS = (p.AUTO_SAVE, p.LIGHT, p.NODE_STATUS_INTERVAL, p.PARACHUTE_STATUS_INTERVAL)
@@ -47,7 +52,8 @@ class HeardTransfer(HeardPacket):
 
 class UpfBench(RecordingBench[HeardTransfer]):
     """risk: the highest that the person allows; nothing above it is ever sent. node: of the
-    controller, 0: whoever tells its state. vehicle: the node id that is used here."""
+    controller, 0: whoever tells its state. vehicle: the node id that is used here. dna: its own
+    node id may be taken from it."""
 
     def __init__(
         self,
@@ -56,6 +62,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         node: int = 0,
         vehicle: int = VEHICLE,
         soak: float = 0.0,
+        dna: bool = False,
     ) -> None:
         super().__init__()
         self.definitions, self.soak, self.node = definitions, soak, 0
@@ -65,7 +72,11 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.changed: dict[str, p.Value] = {}
         #: From which of every it was told to deploy; negative: it was not.
         self.deployed_from = -1
-        self._risk, self._wanted = risk, node
+        #: Gives out node ids, while it shall.
+        self.allocator, self.gives_out = Allocator({}, (vehicle,)), dna
+        self._risk, self._wanted, self._dna = risk, node, dna
+        #: Its node id as it was found, and all that it has had.
+        self._home, self._ids = 0, {0}
         self._endpoint = Endpoint(definitions.types, vehicle)
         self._numbers: dict[tuple[int, str], int] = {}
         self._beat_at = self._tell_at = -math.inf
@@ -85,8 +96,12 @@ class UpfBench(RecordingBench[HeardTransfer]):
         if heard.source == self.node:
             self.heard.append(one)
             self.heard_at = now
+            if one.kind == NODE_STATUS:
+                self.device_is_up(one.values["uptime_sec"], 2.0**32)
         if heard.kind is Kind.REQUEST:
             self._answer(heard)
+        elif heard.name == ALLOCATION and self.gives_out:
+            self._allocate(heard)
 
     def stream_ended(self, stream: Hashable) -> None:
         pass
@@ -113,6 +128,15 @@ class UpfBench(RecordingBench[HeardTransfer]):
         if request.name == names.VEHICLE_SERVICE:
             result = self.definitions.result(names.VEHICLE_SERVICE, "SUCCESS")
             self._endpoint.respond(request, result)
+
+    def _allocate(self, message: Heard) -> None:
+        """As the one allocator of the bus, whose table needs no keeping."""
+        in_use = {one.transfer.source: b"" for one in self.every if one.transfer.source}
+        self.allocator.heard(message.source, message.values, in_use, True, self.now)
+        for one in self.allocator.take_keep():
+            self.allocator.kept(one.number)
+        for values in self.allocator.take_answers():
+            self._endpoint.broadcast(ALLOCATION, values)
 
     # -- what is sent ---------------------------------------------------------------------------
 
@@ -155,6 +179,10 @@ class UpfBench(RecordingBench[HeardTransfer]):
             risk = Risk.FIRES if kind in _FIRES else Risk.ARMS
         elif service == bus_requests.GET_SET and "empty" not in values["value"]:
             named = bytes(values["name"]).decode()
+            if named == p.STATIC_NODE_ID:
+                if self._dna:
+                    return
+                raise NotAllowedError(f"{named} needs {DNA}")
             risk = Risk.NONE if named in _HARMLESS else Risk.ARMS
         if risk > self._risk:
             text = f"{service} {dict(values)}"
@@ -174,12 +202,11 @@ class UpfBench(RecordingBench[HeardTransfer]):
         began = self.now
 
         def found() -> int:
-            told = (one for one in self.every if one.kind == names.PARACHUTE_STATUS)
-            sources = (one.transfer.source for one in told)
-            return next((one for one in sources if self._wanted in (0, one)), 0)
+            return next((one for one in self._parachutes(0) if self._wanted in (0, one)), 0)
 
         yield Wait(began + _FOUND_WITHIN, found)
-        self.node = found()
+        self.node = self._home = found()
+        self._ids.add(self.node)
         if not self.node:
             others = sorted({one.transfer.source for one in self.every})
             heard = ", ".join(map(str, others)) or "nobody"
@@ -191,6 +218,11 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.heard_at = self.now
         yield from self.call(bus_requests.GET_NODE_INFO, {}, 1)
         return f"node {self.node}"
+
+    def _parachutes(self, since: int) -> Iterator[int]:
+        """Who has told the state of a parachute, from this place of every on."""
+        told = (one for one in self.every[since:] if one.kind == names.PARACHUTE_STATUS)
+        return (one.transfer.source for one in told)
 
     def identity(self) -> Mapping[str, str]:
         """Of its GetNodeInfo."""
@@ -210,15 +242,22 @@ class UpfBench(RecordingBench[HeardTransfer]):
         """Not armed, and its parameters as they were."""
         if not self.node or (self._risk is Risk.NONE and not self.changed):
             return "nothing was changed"
+        left = []
+        if p.STATIC_NODE_ID in self.changed:
+            yield from self.comes_back(_AWAY)
+            if not (yield from self.static_again()):
+                left.append(f"{p.STATIC_NODE_ID} is LEFT 0: a node id must be given to it")
+                self.changed.pop(p.STATIC_NODE_ID, None)
         if self._risk is not Risk.NONE:
             for name in ("TYPE_DISARM", "TYPE_LAND"):
                 yield from self.ask(name)
-        left = []
         for name, value in [*self.changed.items()]:
             if not (yield from self.put_back(name)):
                 left.append(f"{name} is not {p.words(value)} again")
-        state = yield from self.state()
-        if state is ParachuteState.ARMED:
+        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
+        if status is None:
+            left.append("it may be LEFT ARMED: no ParachuteStatus shows it")
+        elif self.definitions.state(status.values["state"]) is ParachuteState.ARMED:
             left.append("it is LEFT ARMED")
         if left:
             raise failed(f"the device: {'; '.join(left)}")
@@ -229,6 +268,17 @@ class UpfBench(RecordingBench[HeardTransfer]):
         service = names.PARACHUTE_SERVICE
         answer = yield from self.call(service, self.definitions.request(service, type_name))
         return None if answer is None else self.definitions.result_name(service, answer)
+
+    def tell_time(self, microseconds: int) -> None:
+        """GlobalTimeSync: the one before was sent at this time; 0: there was none."""
+        values = {"previous_transmission_timestamp_usec": microseconds}
+        self.noted(True, "us", time_sync.MESSAGE, str(microseconds), b"")
+        self._endpoint.broadcast(time_sync.MESSAGE, values)
+
+    def triggers(self) -> list[int]:
+        """The nodes that have told the state of a trigger."""
+        told = {one.transfer.source for one in self.every if one.kind == names.TRIGGER_STATUS}
+        return sorted(told)
 
     def get(self, name: str = "", index: int = 0) -> Any:
         """The response of GetSet (its values); None: not answered."""
@@ -258,6 +308,38 @@ class UpfBench(RecordingBench[HeardTransfer]):
                 return False
             del self.changed[name]
         return True
+
+    def save_and_restart(self) -> Trial:
+        """What was set is kept, whether it saves by itself or not."""
+        save = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
+        yield from self.call(bus_requests.EXECUTE_OPCODE, save)
+        yield from self.call(
+            bus_requests.RESTART_NODE, {"magic_number": bus_requests.RESTART_MAGIC}, 1
+        )
+        return ""
+
+    def comes_back(self, within: float) -> Any:
+        """Whether a parachute tells its state within so many s, under its new node id."""
+        since = len(self.every)
+        # Another parachute on this bus is not the one that was sent away.
+        others = set(self._parachutes(0)) - self._ids
+
+        def found() -> int:
+            return next((one for one in self._parachutes(since) if one not in others), 0)
+
+        self.gives_out = True
+        yield Wait(self.now + within, found)
+        self.node = found() or self.node
+        self._ids.add(self.node)
+        return bool(found())
+
+    def static_again(self) -> Any:
+        """Whether it is under its own node id again, with the static node id that it had."""
+        if not (yield from self.put_back(p.STATIC_NODE_ID)):
+            return False
+        yield from self.save_and_restart()
+        self.node = self._home
+        return (yield from self.reaches(ParachuteState.READY, _AWAY))
 
     def state(self) -> Any:
         """The state (ParachuteState) that it tells next; None: a number without a name."""

@@ -21,8 +21,9 @@ from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, Up
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan import time_sync
 
 DOCUMENT = "Flyfire UPF UAVCAN protocol V1.0"
 WATCHED = 5.0
@@ -36,6 +37,8 @@ _NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
 _UNKNOWN = "No Such Parameter"
 #: It is ready so long after a restart at the latest, s.
 READY_WITHIN = 15.0
+#: Microseconds since 1970.
+_SOME_TIME = 1_790_000_000_000_000
 
 UpfClause = Clause[UpfBench]
 clause: Callable[..., UpfClause] = partial(Clause, DOCUMENT)
@@ -101,7 +104,7 @@ def _statistics(bench: UpfBench) -> Trial:
 
 
 def _uptime(bench: UpfBench) -> Trial:
-    yield from ()
+    yield from bench.watch_once(WATCHED)
     told = _node_statuses(bench)
     if len(told) < 2:
         raise not_tried("NodeStatus came too seldom")
@@ -118,6 +121,7 @@ def _status_interval(bench: UpfBench) -> Trial:
     told = yield from bench.value(p.PARACHUTE_STATUS_INTERVAL)
     if not isinstance(told, (int, float)) or isinstance(told, bool):
         raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
+    yield from bench.watch_once(WATCHED)
     mean = _mean(bench, names.PARACHUTE_STATUS)
     if abs(mean - told / 1000.0) > max(_SHARE * told / 1000.0, _LEAST):
         packets = bench.packets(names.PARACHUTE_STATUS)
@@ -329,6 +333,35 @@ def _after_restart(bench: UpfBench, name: str) -> Trial:
     return p.words((yield from bench.value(name)))
 
 
+def _time_sync(bench: UpfBench) -> Trial:
+    yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
+    before = yield from bench.state()
+    bench.tell_time(0)
+    for number in range(3):
+        yield from bench.watch_on(time_sync.INTERVAL)
+        bench.tell_time(_SOME_TIME + number * int(time_sync.INTERVAL * 1e6))
+    after = yield from bench.state()
+    if after is not before:
+        raise failed(f"the time of the bus moved it from {before} to {after}")
+    return "it goes on; nothing that it tells shows the time that it has"
+
+
+def _trigger_id(bench: UpfBench) -> Trial:
+    triggers = bench.triggers()
+    if not triggers:
+        raise not_tried("no TriggerStatus is received")
+    defaults = []
+    for node in triggers:
+        values = {"index": 0, "value": {"empty": {}}, "name": p.STATIC_NODE_ID.encode()}
+        answer = yield from bench.call(bus_requests.GET_SET, values, node=node)
+        defaults.append(None if answer is None else p.value_of(answer["default_value"]))
+    for node, default in zip(triggers, defaults, strict=True):
+        if default != TRIGGER_NODE_ID:
+            told = p.words(default) or "not told"
+            raise failed(f"the static node id of trigger {node} as delivered is {told}")
+    return f"as delivered {TRIGGER_NODE_ID}; it is {', '.join(map(str, triggers))}"
+
+
 def _soak(bench: UpfBench) -> Trial:
     yield from bench.watch(bench.soak)
     longest = _longest_pause(bench, bench.soak)
@@ -382,7 +415,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _restart_refused,
         "it must not, but it may restart",
     ),
-    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS),
+    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS, restarts=True),
     clause(
         _STATES,
         "block-at-start",
@@ -403,6 +436,13 @@ CLAUSES: tuple[UpfClause, ...] = (
         "with Enable Auto-Save off only ExecuteOpcode keeps a change",
         _kept_by_opcode,
         "a parameter is changed, it restarts twice, and it is set back",
+        restarts=True,
+    ),
+    clause(
+        _STANDARD, "time-sync", "GlobalTimeSync does it no harm", _time_sync, "it is told a time"
+    ),
+    clause(
+        _NODE, "trigger-node-id", "the static node id of a trigger as delivered is 34", _trigger_id
     ),
     clause(
         "Over hours",

@@ -9,11 +9,13 @@ from typing import Any
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NODE_STATUS
+from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.endpoint import Heard
 
@@ -22,6 +24,8 @@ _S = ParachuteState
 _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
 #: It takes off by itself after so long, s; and tells no state for so long at first.
 _TAKES_OFF_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
+#: It is silent for so long after it was first told the time, s.
+_STANDS_STILL = 6.4
 #: Request -> the clause that it breaks by its answer, though it does as it is told.
 _ANSWERS = {
     "TYPE_TAKEOFF": "takeoff",
@@ -43,9 +47,10 @@ class BrokenController(UpfController):
     def __init__(
         self, definitions: Definitions, settings: ControllerSettings, breaks: str
     ) -> None:
-        super().__init__(definitions, settings)
         self.breaks = breaks
+        super().__init__(definitions, settings)
         self._first_start = self._ready_since = math.nan
+        self._dumb_until = -math.inf
         if change := _CHANGES.get(breaks):
             change(self)
 
@@ -54,8 +59,25 @@ class BrokenController(UpfController):
             self._first_start = now
         super().start(now)
 
+    def reboot(self) -> None:
+        """It keeps the node id that it was given, where it must not."""
+        given = self._dna.node_id
+        super().reboot()
+        if self.breaks == "dna-forgets" and given and not self.node_id:
+            self.endpoint.node_id = given
+
+    def receive(self, data: bytes, now: float) -> None:
+        asked, synced = not self.node_id, self.clock.master
+        super().receive(data, now)
+        if self.breaks == "time-sync" and self.clock.master and not synced:
+            self._dumb_until = now + _STANDS_STILL
+        if self.breaks == "dna" and asked and self.node_id:
+            self.endpoint.node_id -= 1
+
     def take_output(self) -> list[bytes]:
         frames, up = super().take_output(), self.now - self._first_start
+        if self.now < self._dumb_until:
+            return []
         pauses = self.breaks == "soak" and _PAUSES_AT <= up < _PAUSES_AT + _PAUSES_FOR
         return [] if pauses else frames
 
@@ -109,6 +131,15 @@ def simulated_controller(
     if breaks:
         return BrokenController(definitions, settings, breaks)
     return UpfController(definitions, settings)
+
+
+def simulated_trigger(
+    definitions: Definitions, name: str, node_id: int, breaks: str
+) -> UpfTrigger:
+    """A simulated trigger of a controller that breaks this, as it is delivered."""
+    wrong = breaks == "trigger-node-id" and node_id == TRIGGER_NODE_ID
+    values = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: node_id + wrong}
+    return UpfTrigger(definitions, NodeSettings(name, values))
 
 
 Answer = dict[str, Any] | None
@@ -240,5 +271,6 @@ BREAKS = (
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
     *("state-known", "soak", "unknown-type", "no-auto-takeoff", "arm-order"),
-    *("disabled", "deploy", "touchdown"),
+    *("disabled", "deploy", "touchdown", "dna", "dna-forgets"),
+    *("time-sync", "trigger-node-id"),
 )

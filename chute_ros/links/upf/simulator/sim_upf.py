@@ -68,13 +68,16 @@ def _run() -> None:
     chosen = options.parse_args()
 
     from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, Definitions
-    from chute_ros.links.upf.simulator.broken import BREAKS, simulated_controller
+    from chute_ros.links.upf.simulator.broken import (
+        BREAKS,
+        simulated_controller,
+        simulated_trigger,
+    )
     from chute_ros.links.upf.simulator.bus import UpfBus
     from chute_ros.links.upf.simulator.controller import ControllerSettings
     from chute_ros.links.upf.simulator.errors import error_places
     from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
     from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
-    from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
     from chute_ros.sim.vehicle_sense import sensing
     from chute_ros.transport.data_types import load_data_types
 
@@ -93,8 +96,9 @@ def _run() -> None:
     if chosen.breaks and chosen.breaks not in BREAKS:
         raise ParameterError(f"--break {chosen.breaks!r}: need one of {', '.join(BREAKS)}")
     controller = simulated_controller(definitions, settings, chosen.breaks)
-    of_trigger = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id}
-    trigger = UpfTrigger(definitions, NodeSettings(f"{chosen.name}.trigger", of_trigger))
+    trigger = simulated_trigger(
+        definitions, f"{chosen.name}.trigger", chosen.trigger_node_id, chosen.breaks
+    )
     nodes: list[UpfNode] = [] if chosen.no_controller else [controller]
     nodes += [] if chosen.no_trigger else [trigger]
     if not nodes:

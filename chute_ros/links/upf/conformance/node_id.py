@@ -1,0 +1,91 @@
+"""A node id that is given out: dynamic node id allocation (DNA)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from chute_ros.conformance.clause import Trial, Wait, failed, not_tried
+from chute_ros.links.upf.conformance.bench import DNA, UpfBench
+from chute_ros.links.upf.conformance.standard import UpfClause, clause
+from chute_ros.links.upf.protocol import bus_requests
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+
+_DOES = "its static node id is 0 for a while; it restarts twice, and is set back"
+#: A device asks each 0.6 to 1 s, three parts one after the other, and then starts to tell, s.
+_COMES_WITHIN, _ASKS_WITHIN = 15.0, 5.0
+
+
+def _unique_id(bench: UpfBench) -> Any:
+    answer = yield from bench.call(bus_requests.GET_NODE_INFO, {})
+    return None if answer is None else bytes(answer["hardware_version"]["unique_id"])
+
+
+def _becomes_dynamic(bench: UpfBench) -> Any:
+    """Its unique id, once it has started anew without a node id of its own."""
+    unique_id = yield from _unique_id(bench)
+    if unique_id is None:
+        raise not_tried("GetNodeInfo is not answered")
+    if (yield from bench.set(p.STATIC_NODE_ID, 0)) != 0:
+        raise failed(f"{p.STATIC_NODE_ID} 0 is not taken")
+    yield from bench.save_and_restart()
+    return unique_id
+
+
+def _given(bench: UpfBench) -> Trial:
+    unique_id = yield from _becomes_dynamic(bench)
+    yield from bench.comes_back(_COMES_WITHIN)
+    given, node = bench.allocator.table.get(unique_id), bench.node
+    other, units = bench.allocator.other, len(bench.allocator.table)
+    yield from bench.static_again()
+    if other:
+        raise not_tried(f"node {other} gives out node ids as well")
+    if given is None:
+        raise failed(f"unit {unique_id.hex()} asked for no node id ({units} others did)")
+    if given != node:
+        raise failed(f"it was given node id {given}, and it was node {node}")
+    return f"node {given}, as given"
+
+
+def _forgets(bench: UpfBench) -> Trial:
+    unique_id = yield from _becomes_dynamic(bench)
+    yield from bench.comes_back(_COMES_WITHIN)
+    since = len(bench.every)
+    bench.gives_out = False
+    yield from bench.save_and_restart()
+
+    def asked() -> bool:
+        every = (one for one in bench.every[since:] if one.kind == ALLOCATION)
+        return any(unique_id.startswith(bytes(one.values["unique_id"])) for one in every)
+
+    yield Wait(bench.now + _ASKS_WITHIN, asked)
+    bench.gives_out = True
+    asks = asked()
+    yield from bench.comes_back(_COMES_WITHIN)
+    yield from bench.static_again()
+    if not asks:
+        raise failed("after a restart it goes on with the node id that it was given before")
+    return "after a restart it asks again"
+
+
+_NODE = "Node discovery"
+CLAUSES: tuple[UpfClause, ...] = (
+    clause(
+        _NODE,
+        "dna",
+        "with Static Node ID 0 it asks for a node id (DNA), and has the one that it is given",
+        _given,
+        _DOES,
+        needs=DNA,
+        restarts=True,
+    ),
+    clause(
+        _NODE,
+        "dna-forgets",
+        "it does not keep that node id: it asks at each start",
+        _forgets,
+        _DOES,
+        needs=DNA,
+        restarts=True,
+    ),
+)

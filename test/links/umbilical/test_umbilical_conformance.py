@@ -1,0 +1,374 @@
+"""The kit on the simulated flight computer, sound and broken in each clause, in virtual time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import cycle
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chute_ros.conformance.bench import NotAllowedError
+from chute_ros.conformance.clause import SOAK, Result, Risk, Verdict
+from chute_ros.conformance.session import Allowed, Ended, Found, Session
+from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.links.umbilical.conformance import CLAUSES
+from chute_ros.links.umbilical.conformance.bench import UmbilicalBench
+from chute_ros.links.umbilical.conformance.permits import REBOOT, WIPE
+from chute_ros.links.umbilical.kit import KIT
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.commands import KINDS
+from chute_ros.links.umbilical.simulator.broken import BREAKS
+from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+
+NAMES = [one.name for one in CLAUSES]
+LAYOUTS = {one.name: one for one in load_layouts("", "the tests")}
+REFERENCE = LAYOUTS["telem57_airbrake_state"]
+OPTIONS = (REBOOT, WIPE)
+
+
+class Run:
+    """Kit and flight computer on one cable."""
+
+    def __init__(
+        self,
+        device: FlightComputer,
+        risk: Risk = Risk.FIRES,
+        options: tuple[str, ...] = OPTIONS,
+        session: Session[UmbilicalBench] | None = None,
+    ) -> None:
+        self.device = device
+        bench = UmbilicalBench(device.layout, risk, options)
+        self.session = session or Session(bench, CLAUSES, Allowed(risk, options))
+        self.line = VirtualLine(self.session, device)  # type: ignore[arg-type]
+
+    def to(self, until: Callable[[], bool] = lambda: False) -> Run:
+        """To its end, or until this holds."""
+        self.line.run(until)
+        return self
+
+    @property
+    def results(self) -> dict[str, Result]:
+        """By clause."""
+        return {one.clause.name: one for one in self.line.events if isinstance(one, Result)}
+
+    def of(self, verdict: Verdict) -> list[str]:
+        """The clauses with this verdict."""
+        return [name for name, one in self.results.items() if one.verdict is verdict]
+
+    @property
+    def problem(self) -> str:
+        """How it ended."""
+        (ended,) = (one for one in self.line.events if isinstance(one, Ended))
+        return ended.problem
+
+
+def sound(layout: str = REFERENCE.name, **knobs: object) -> FlightComputer:
+    return FlightComputer(FlightComputerSettings(**knobs), LAYOUTS[layout])  # type: ignore[arg-type]
+
+
+def simulated(broken: str) -> Run:
+    """As the kit has it for its evidence."""
+    line = KIT.virtual(broken)
+    return Run(line.device, session=line.session).to()  # type: ignore[arg-type]
+
+
+# -- what it finds ------------------------------------------------------------------------------
+
+
+def test_a_sound_device_passes_all_that_can_be_tried() -> None:
+    run = simulated("")
+    assert run.of(Verdict.FAILED) == []
+    unseen = ["heartbeat-timeout"]
+    wants_options = [one.name for one in CLAUSES if one.needs in OPTIONS]
+    assert run.of(Verdict.NOT_TRIED) == [*unseen, *wants_options]
+    assert [*run.results] == NAMES
+    assert run.problem == ""
+    assert run.device.mode is Mode.Startup
+
+
+def test_what_restarts_and_wipes_passes_with_its_options() -> None:
+    """Given a flight computer with a snapshot of an earlier flight in its FRAM."""
+    device = sound()
+    device.memory.snapshot("of a flight before")
+    run = Run(device).to()
+    assert run.of(Verdict.FAILED) == []
+    assert run.of(Verdict.NOT_TRIED) == ["heartbeat-timeout", "soak"]
+
+
+def test_what_a_log_tells_of_the_connection_is_tried() -> None:
+    """Given a flight computer in debug mode, which takes 15 s for its limit."""
+    run = Run(sound(debug=True)).to()
+    assert run.of(Verdict.FAILED) == []
+    assert run.results["heartbeat-timeout"].why.startswith("it counts as lost 15.")
+
+
+@pytest.mark.parametrize("layout", [*LAYOUTS])
+def test_a_firmware_of_another_layout_passes_with_its_name(layout: str) -> None:
+    run = Run(sound(layout)).to()
+    assert run.of(Verdict.FAILED) == []
+    assert run.results["field-count"].verdict is Verdict.PASSED
+    shows_target = bool(LAYOUTS[layout].target_fields)
+    assert (run.results["target"].verdict is Verdict.PASSED) == shows_target
+
+
+def test_a_firmware_of_another_layout_is_told_without_its_name() -> None:
+    """Given 54 fields, and a kit that was told of the reference's 57."""
+    bench = UmbilicalBench(REFERENCE)
+    run = Run(sound("telem54"), session=Session(bench, CLAUSES, Allowed())).to()
+    assert run.of(Verdict.FAILED)[0] == "field-count"
+    assert "54 fields (need 57" in run.results["field-count"].why
+    assert run.results["pressure"].verdict is Verdict.NOT_TRIED
+    assert [*run.results] == NAMES
+
+
+def test_a_firmware_that_vents_by_safe_fails_in_that() -> None:
+    """Given the known firmware, whose <V> opens the SV; it is left closed all the same."""
+    run = Run(sound(safe_opens_sv=True)).to()
+    assert run.of(Verdict.FAILED) == ["safe"]
+    assert run.problem == ""
+
+
+def test_a_firmware_that_wants_its_flash_wiped_is_not_armed() -> None:
+    run = Run(sound(interlock=True), Risk.ARMS, ()).to()
+    assert run.of(Verdict.FAILED) == []
+    assert run.results["key-arm"].why == "it says: Arming blocked: wipe flash first"
+
+
+def test_each_clause_has_a_way_to_be_broken() -> None:
+    assert sorted(BREAKS) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
+    run = simulated(name)
+    assert run.of(Verdict.FAILED) == [name]
+    assert run.results[name].why
+    assert run.results[name].proof, "packets that show it"
+
+
+# -- whatever it is told -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*KINDS])
+def test_a_device_without_one_command_is_tried_to_the_end(name: str) -> None:
+    device = sound()
+    token = KINDS[name].command.token.decode()
+    device.flight.handlers.pop(token, None)
+    device.commands_apart[token] = lambda: None
+    assert [*Run(device).to().results] == NAMES
+
+
+TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
+NUMBERS = st.one_of(
+    st.sampled_from(["", "NaN", "inf", "-inf", "-0", "1e5", "0"]),
+    st.integers(-(2**33), 2**33).map(str),
+    st.floats().map(repr),
+)
+
+
+@settings(max_examples=25)
+@given(
+    field=st.sampled_from([one.name for one in REFERENCE.fields]),
+    told=st.lists(st.one_of(NUMBERS, TEXTS), min_size=1, max_size=4),
+)
+def test_a_device_with_any_text_in_a_field_is_tried_to_the_end(
+    field: str, told: list[str]
+) -> None:
+    device = sound()
+    every, place = cycle(told), REFERENCE.index[field]
+    put_line = device.queue.put_line
+
+    def changed(text: str, now: float) -> None:
+        if text.startswith("$TELEM,"):
+            mark, *texts = text.split(",")
+            texts[place] = next(every)
+            text = ",".join([mark, *texts])
+        put_line(text, now)
+
+    device.queue.put_line = changed  # type: ignore[method-assign]
+    assert [*Run(device).to().results] == NAMES
+
+
+@settings(max_examples=15)
+@given(lines=st.lists(st.binary(max_size=90), min_size=1, max_size=5))
+def test_a_device_that_sends_any_bytes_besides_is_tried_to_the_end(lines: list[bytes]) -> None:
+    device = sound()
+    every, take = cycle(lines), device.queue.take
+
+    def more(now: float) -> list[bytes]:
+        gone = take(now)
+        return [next(every), *gone] if gone else []
+
+    device.queue.take = more  # type: ignore[method-assign]
+    # What hides all of its telemetry is not found.
+    assert [*Run(device).to().results] in (NAMES, [])
+
+
+@settings(max_examples=10)
+@given(cut=st.floats(0.0, 0.6), garbage=st.floats(0.0, 1.0), seed=st.integers(0, 99))
+def test_a_cable_that_damages_lines_is_tried_to_the_end(
+    cut: float, garbage: float, seed: int
+) -> None:
+    run = Run(sound(cut=cut, garbage=garbage, seed=seed)).to()
+    assert [*run.results] == NAMES
+
+
+# -- what it must not do ------------------------------------------------------------------------
+
+
+def sent_by(run: Run) -> set[str]:
+    """The commands of the reference that were sent, by their names."""
+    return {name for name, kind in KINDS.items() if kind.command.token in run.line.sent}
+
+
+ARMS = {"key_arm", "key_disarm"}
+WIPES = {"reset_fram", "wipe_flash", "wipe_fram_and_reboot"}
+ASKS = {"heartbeat", "flash_info", "dump_fram", "dump_flash"}
+
+
+@pytest.mark.parametrize("options", [(), (REBOOT,), (WIPE,)])
+@pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
+def test_what_was_not_allowed_is_never_sent(risk: Risk, options: tuple[str, ...]) -> None:
+    run = Run(sound(), risk, options).to()
+    wanted = ASKS | (ARMS if risk is Risk.ARMS else set())
+    wanted |= {"reboot"} if REBOOT in options else set()
+    # The FRAM is filled while it is armed; an empty one is not reset.
+    wanted |= WIPES if WIPE in options else set()
+    wanted -= {"reset_fram"} if risk is Risk.NONE else set()
+    assert sent_by(run) == wanted
+    assert run.device.mode is Mode.Startup
+    assert not any(run.device.flight.flags.values())
+    tried = [one for one in CLAUSES if run.results[one.name].verdict is not Verdict.NOT_TRIED]
+    assert max(one.risk for one in tried) == risk
+
+
+def test_what_it_changed_is_set_back() -> None:
+    """Given a flight computer with a target."""
+    device = sound()
+    run = Run(device, Risk.NONE, ())
+    run.to(lambda: bool(device.heartbeats))
+    device.flight.target = (12.5, -70.25)
+    run.to()
+    assert run.results["target"].verdict is Verdict.PASSED
+    assert device.flight.target == (12.5, -70.25)
+
+
+MORE_THAN_ARMS = ["<L>", "<M>", "<S>", "<D>", "<d>", "<1>", "<A3>", "<W>", "<F>", "<X>", "<R>"]
+
+
+@pytest.mark.parametrize("form", ["%s", "x%s", "(%s)", "%s%s", "<H>%s"])
+@pytest.mark.parametrize("token", MORE_THAN_ARMS)
+def test_a_trial_that_would_do_more_unasked_ends_in_our_own_error(token: str, form: str) -> None:
+    bench = UmbilicalBench(REFERENCE, Risk.ARMS)
+    bench.at(1.0)
+    for text in (token, token[1:-1], token.swapcase()):
+        data = form.replace("%s", text).encode()
+        if data in (b"<m>", b"<s>", b"<f>"):
+            continue  # closes a valve, or only asks
+        with pytest.raises(NotAllowedError):
+            next(bench.write(data))
+    assert bench.take_output() == []
+
+
+def test_two_writes_are_never_closer_than_the_receiver_can_take() -> None:
+    """Given a flight computer that sleeps 0.1 s after each command."""
+    device = sound()
+    Run(device, Risk.NONE, ()).to()
+    # What the kit writes wrong on purpose is all that is lost.
+    assert {*device.receiver.lost} <= {"unknown", "glued"}
+
+
+# -- how it is left -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("risk", "reached"),
+    [
+        (Risk.ARMS, lambda device: device.mode is Mode.Standby),
+        (Risk.FIRES, lambda device: device.flight.flags["mav_open"]),
+        (Risk.FIRES, lambda device: device.flight.flags["sv_open"]),
+        (Risk.FIRES, lambda device: device.mode is Mode.Ascent),
+    ],
+)
+def test_an_abort_leaves_it_safe(risk: Risk, reached: Callable[[FlightComputer], bool]) -> None:
+    """Given a Ctrl-C while it is armed, a valve is open, or it is launched."""
+    device = sound()
+    run = Run(device, risk, ())
+    run.to(lambda: bool(reached(device)))
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    assert device.mode is Mode.Startup
+    assert not device.flight.flags["mav_open"]
+    assert not device.flight.flags["sv_open"]
+    assert run.problem == "aborted by Ctrl-C"
+
+
+def test_heartbeats_go_on_after_an_abort_in_a_while_without() -> None:
+    """Given a Ctrl-C while it is tried how long the connection lasts."""
+    device = sound()
+    run = Run(device, Risk.ARMS, ())
+    run.to(lambda: run.line.now - 100.0 > 15.0)
+    assert run.line.now - device.heartbeats[-1] > 2.0
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    assert run.line.now - device.heartbeats[-1] < 1.0
+
+
+def test_a_device_that_cannot_be_disarmed_is_named() -> None:
+    device = sound()
+    run = Run(device, Risk.ARMS, ())
+    run.to(lambda: device.mode is Mode.Standby)
+    device.deaf = True
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    left = "the device: it is LEFT ARMED: flight mode Standby"
+    assert run.problem.startswith(f"aborted by Ctrl-C; {left}")
+
+
+def test_a_device_whose_state_cannot_be_seen_is_named() -> None:
+    """Given one that falls silent while a valve is open."""
+    device = sound()
+    run = Run(device)
+    run.to(lambda: bool(device.flight.flags["sv_open"]))
+    device.act("silent")
+    run.to()
+    assert "LEFT ARMED, and its valves open: no telemetry shows it" in run.problem
+    assert not device.flight.flags["sv_open"], "closed all the same"
+
+
+def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
+    device = sound()
+    run = Run(device, Risk.NONE, ())
+    run.to(lambda: "unknown" in run.results)
+    device.act("silent")
+    run.to()
+    assert run.of(Verdict.FAILED) == []
+    told = "the device fell silent as brackets was tried"
+    assert run.results["soak"].why == told
+    assert run.problem.startswith(told)
+
+
+def test_where_no_telemetry_is_received_nothing_is_tried() -> None:
+    run = Run(device := sound())
+    run.to(lambda: bool(device.heartbeats))
+    device.act("silent")
+    run.to()
+    assert run.problem.startswith("no $TELEM line is received within 10 s (0 bytes were)")
+    assert run.results == {}
+    assert not any(isinstance(one, Found) for one in run.line.events)
+
+
+def test_a_soak_of_a_device_that_starts_anew_fails() -> None:
+    device = sound()
+    clauses = [one for one in CLAUSES if one.needs == SOAK]
+    bench = UmbilicalBench(REFERENCE, soak=30.0)
+    run = Run(device, session=Session(bench, clauses, Allowed(options=(SOAK,))))
+    run.to(lambda: run.line.now > 115.0)
+    device.act("reboot")
+    run.to()
+    assert run.results["soak"].why == "without a command it started anew"
+    assert not math.isnan(device.booted_at)

@@ -1,0 +1,35 @@
+"""What holds for the kit of each device."""
+
+from __future__ import annotations
+
+import pytest
+
+from chute_ros.conformance.clause import SOAK, Clause, Result, Risk, Verdict
+from chute_ros.conformance.kit import Kit
+from chute_ros.conformance.session import Allowed, Session
+from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.links.api import load
+from chute_ros.links.registered import links
+
+KITS: dict[str, Kit] = {one.device: load(one.kit) for one in links().values() if one.kit}
+ALONE = [(device, clause) for device, kit in KITS.items() for clause in kit.clauses]
+
+
+@pytest.mark.parametrize(
+    ("device", "clause"), ALONE, ids=[f"{device}-{one.name}" for device, one in ALONE]
+)
+def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
+    device: str, clause: Clause[object]
+) -> None:
+    """Given --only and the option that the clause needs."""
+    sound, bench = KITS[device].simulated("", clause.needs or SOAK)
+    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, (clause.needs,))), sound)
+    line.run()
+    (result,) = (one for one in line.events if isinstance(one, Result))
+    assert result.verdict in (Verdict.PASSED, Verdict.NOT_TRIED), result.why
+
+
+def test_each_clause_has_a_name_of_its_own() -> None:
+    for kit in KITS.values():
+        names = [one.name for one in kit.clauses]
+        assert len(set(names)) == len(names)

@@ -1,0 +1,167 @@
+"""The command conformance on a flight computer at the end of a pseudo terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+from conformance_processes import COMMAND, started
+from mcap.reader import make_reader
+
+MODULE = "chute_ros.links.umbilical.simulator.sim_flight_computer"
+QUICK = ["--only", "target", "flash-info"]
+
+
+class Bench:
+    """A flight computer on a pseudo terminal, whose cable can be pulled."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        self._link, self._control = folder / "tty", folder / "control"
+        self._folder = folder
+        told = ("--link", str(self._link), "--control", str(self._control))
+        self._device = (sys.executable, "-u", "-m", MODULE, *told, *options)
+
+    @contextmanager
+    def trying(self, *options: str) -> Iterator[subprocess.Popen[str]]:
+        """The device, and the kit that tries it."""
+        with ExitStack() as both:
+            device = both.enter_context(started(*self._device))
+            assert device.stdout is not None
+            assert str(self._link) in device.stdout.readline()
+            connection = ("--connection", f"serial:{self._link}")
+            yield both.enter_context(started(*COMMAND, "umbilical", *connection, *options))
+
+    def run(self, *options: str, typed: str = "") -> tuple[int, str, str]:
+        """(exit code, output, errors) of the kit."""
+        with self.trying(*options) as kit:
+            out, errors = kit.communicate(typed, timeout=60.0)
+            return kit.returncode, out, errors
+
+    def act(self, action: str) -> None:
+        """The device does this."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as one:
+            one.bind(str(self._folder / "hand"))
+            one.sendto(action.encode(), str(self._control))
+            assert one.recv(100) == b"ok"
+        os.unlink(self._folder / "hand")
+
+
+def until(kit: subprocess.Popen[str], text: str) -> None:
+    """The kit has told a line with this text."""
+    assert kit.stdout is not None
+    assert any(text in line for line in kit.stdout)
+
+
+def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
+    page, traffic = tmp_path / "a.html", tmp_path / "a.mcap"
+    files = ("--html", str(page), "--mcap", str(traffic))
+    code, out, errors = Bench(tmp_path).run(*QUICK, *files)
+    assert (code, errors) == (0, "")
+    assert "umbilical flight computer (telem57_airbrake_state): 2 passed\n" in out
+    assert "Flash: 1024/14336 KB used (7.1%)" in page.read_text()
+    with traffic.open("rb") as file:
+        packets = [json.loads(one.data) for *_, one in make_reader(file).iter_messages()]
+    assert {"$TELEM", "write", "line"} <= {one["name"] for one in packets}
+
+
+def test_a_clause_that_fails_ends_with_1(tmp_path: Path) -> None:
+    code, out, _ = Bench(tmp_path, "--break", "flash-info").run(*QUICK)
+    assert code == 1
+    assert "FAILED         flash-info           nothing comes of <I>" in out
+
+
+def test_a_firmware_of_another_layout_is_tried_with_its_name(tmp_path: Path) -> None:
+    layout = ("--layout", "telem54")
+    code, out, errors = Bench(tmp_path, *layout).run(*layout, "--only", "field-count", "target")
+    assert (code, errors) == (0, "")
+    assert "2 passed" in out
+
+
+def test_what_wipes_takes_its_option_and_is_told_before(tmp_path: Path) -> None:
+    bench, one = Bench(tmp_path), ("--only", "wipe-flash")
+    code, out, _ = bench.run(*one)
+    assert (code, "IT WIPES" in out) == (0, False)
+    assert "not tried      wipe-flash           it takes --wipe" in out
+    code, out, _ = bench.run(*one, "--wipe")
+    assert code == 0
+    assert "[1/1] wipe-flash: IT WIPES what it stores" in out
+    assert "passed         wipe-flash           Flash: 0/14336 KB used (0.0%)" in out
+
+
+def test_with_the_word_it_launches_and_is_restarted(tmp_path: Path) -> None:
+    code, out, errors = Bench(tmp_path).run("--fire", "--only", "launch", typed="FIRE\n")
+    assert (code, errors) == (0, "")
+    assert "launch: IT LAUNCHES" in out
+    assert "passed         launch               Ascent after" in out
+
+
+def test_damaged_lines_end_in_words(tmp_path: Path) -> None:
+    """Given a cable that cuts lines and puts random bytes between them."""
+    noisy = Bench(tmp_path, "--cut", "0.3", "--garbage", "0.5")
+    code, out, errors = noisy.run("--only", "line-end", "text", "field-count", "target")
+    assert (code, errors) == (1, "")
+    assert "FAILED         text                 bytes come that are no text" in out
+    assert "passed         target" in out
+
+
+def test_a_cable_that_is_pulled_tells_that_it_may_be_left_armed(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    with bench.trying("--arm", "--only", "key-arm", "nearly-arms") as kit:
+        assert kit.stdin is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        until(kit, "passed         key-arm")
+        bench.act("cut")
+        out, errors = kit.communicate(timeout=60.0)
+    assert kit.returncode == 3
+    assert "was unplugged" in errors
+    assert "it may be LEFT ARMED" in errors
+    assert "flight computer (telem57_airbrake_state): 1 passed\n" in out
+
+
+def test_a_cable_that_is_plugged_again_leaves_it_disarmed(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    with bench.trying("--arm", "--only", "key-arm", "nearly-arms") as kit:
+        assert kit.stdin is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        until(kit, "passed         key-arm")
+        bench.act("cut")
+        bench.act("restore")
+        _, errors = kit.communicate(timeout=60.0)
+    assert kit.returncode == 3
+    assert "was unplugged" in errors
+    assert "LEFT ARMED" not in errors
+
+
+def test_a_ctrl_c_leaves_it_disarmed(tmp_path: Path) -> None:
+    with Bench(tmp_path).trying("--arm", "--only", "key-arm", "nearly-arms") as kit:
+        assert kit.stdin is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        until(kit, "passed         key-arm")
+        kit.send_signal(signal.SIGINT)
+        _, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (3, "conformance: aborted by Ctrl-C\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--layout", "telem99"), "--layout 'telem99': need one of telem57_airbrake_state, "),
+        (("--connection", "udpin:0.0.0.0:1"), "connection 'udpin:0.0.0.0:1' is no serial port"),
+    ],
+)
+def test_a_mistake_in_the_command_line_ends_with_2(options: tuple[str, ...], told: str) -> None:
+    with started(*COMMAND, "umbilical", *options) as kit:
+        _, errors = kit.communicate(timeout=60.0)
+    assert kit.returncode == 2
+    assert f"conformance: {told}" in errors
