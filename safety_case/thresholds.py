@@ -22,9 +22,9 @@ _MOVED = """
 What changes when limits move, by ``make compare`` (docs/evidence/compare.md): each guard with its
 limits scaled by these factors. Of this product the time of every rule (``for``) is scaled, of a
 peer its own limits. A cell has the flights missed or late, in percent of those that only a
-parachute could save, and the flights ended although they went well, in percent of all. The campaign
-draws faults around each failure, far more often than flights have them: these shares compare
-guards, and are no rates of a fleet.
+parachute could save, and the flights ended although they went well, in percent of all. The
+campaign draws faults around each failure, far more often than flights have them: these shares
+compare guards, and are no rates of a fleet.
 """
 #: How long a rule must hold and the like, as a profile names them.
 _COUNTS = ("for", "leak", "samples", "needed", "doubted", "clears")
