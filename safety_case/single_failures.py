@@ -8,8 +8,8 @@ from safety_case.documents import Node, list_table, of_kind, write_made
 
 _INTRODUCTION = """
 Each single failure that, with the shipped settings, can lead to a missed or to a false deploy
-although everything else works. All other rows of the `FMEA <fmea.html>`_ are covered by what the row
-says. The last column says why the failure stays, and what the integrator must do.
+although everything else works. All other rows of the `FMEA <fmea.html>`_ are covered by what the
+row says. The last column says why the failure stays, and what the integrator must do.
 """
 _LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
 
