@@ -248,11 +248,38 @@ class VehicleState:
     battery_remaining: float = NAN  # 0 to 1
     battery_age: float = NAN
     system_status: int = 0
+    vehicle_type: int = 0
     uptime: float = NAN  # s
     reboot_count: int = 0
     rebooted_in_flight: bool = False
     #: Why this vehicle must not take off, as its source says it, in words.
     faults: tuple[str, ...] = ()
+
+
+class VehicleKind(enum.Enum):
+    """What a profile of rules is for."""
+
+    ANY = "any"
+    MULTIROTOR = "multirotor"
+    FIXED_WING = "fixed_wing"
+    ROCKET = "rocket"
+
+
+#: MAV_TYPE of those with a wing and of those that hover (MAVLink minimal.xml); VTOLs are both.
+_VTOLS = frozenset({*range(19, 26), 47})
+_WITH_A_WING = _VTOLS | {1, 16}
+_HOVER = _VTOLS | {2, 3, 4, 13, 14, 15, 29, 35, 43}
+_MAV_TYPES = {
+    VehicleKind.FIXED_WING: _WITH_A_WING,
+    VehicleKind.MULTIROTOR: _HOVER,
+    VehicleKind.ROCKET: frozenset({9}),
+}
+
+
+def kinds_of(mav_type: int) -> tuple[VehicleKind, ...]:
+    """What a vehicle of this MAV_TYPE may be flown as; empty: nobody can say (generic, a type that
+    is no aircraft of these)."""
+    return tuple(kind for kind, types in _MAV_TYPES.items() if mav_type in types)
 
 
 @dataclass(frozen=True)

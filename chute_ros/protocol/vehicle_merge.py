@@ -191,7 +191,9 @@ class VehicleMerge:
             source=", ".join(source for source in self._sources if source in givers),
             link_state=link_state,
             system_status=system_status,
-            # Only vehicle/state follows the autopilot's clock; a restart once seen stays seen.
+            vehicle_type=self._vehicle.vehicle_type,
+            # Only vehicle/state tells its kind and follows its clock; a restart once seen stays
+            # seen.
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,

@@ -12,7 +12,9 @@ from chute_ros.model import (
     ParachuteStatus,
     SafetyFlags,
     TriggerFlags,
+    VehicleKind,
     flag_names,
+    kinds_of,
 )
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
@@ -119,7 +121,23 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         reasons += [f"vehicle: {fault}" for fault in state.heard.vehicle.faults]
         unable = _UNABLE.get(state.heard.vehicle.system_status)
         reasons += [unable] if unable else []
+        reasons += _other_kind(config, state)
     return tuple(reasons)
+
+
+def _other_kind(config: SupervisorConfig, state: State) -> list[str]:
+    """The profile is for another kind of vehicle than the autopilot says to fly."""
+    profile, told = config.profile, state.heard.vehicle.vehicle_type
+    kinds = kinds_of(told)
+    if not kinds or profile.vehicle in (VehicleKind.ANY, *kinds):
+        return []
+    fitting = " or ".join(one.value for one in kinds)
+    text = (
+        f"the profile {profile.name} is for the vehicle {profile.vehicle.value}, and the "
+        f"autopilot reports MAV_TYPE {told} ({fitting}): set the parameter profile, or `vehicle` "
+        "in a profile of your own"
+    )
+    return [text]
 
 
 def _measured_problems(config: SupervisorConfig, state: State, now: float) -> list[str]:

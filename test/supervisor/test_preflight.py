@@ -31,6 +31,7 @@ from chute_ros.model import (
     ParachuteStatus,
     SafetyFlags,
     TriggerFlags,
+    VehicleKind,
     VehicleState,
 )
 from chute_ros.supervisor import inputs as i
@@ -304,6 +305,39 @@ def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status: int, name: st
     story.at(0.2, story.heartbeat(), story.told(**DOWN, height=0.0, system_status=status))
     assert story.state.stage is Stage.BLOCKED
     assert name in story.said()
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "mav_type", "told"),
+    [
+        (VehicleKind.MULTIROTOR, 2, ""),
+        (VehicleKind.MULTIROTOR, 1, "MAV_TYPE 1 (fixed_wing)"),
+        (VehicleKind.FIXED_WING, 13, "MAV_TYPE 13 (multirotor)"),
+        (VehicleKind.ROCKET, 2, "MAV_TYPE 2 (multirotor)"),
+        # A VTOL is flown by either.
+        (VehicleKind.MULTIROTOR, 22, ""),
+        (VehicleKind.FIXED_WING, 22, ""),
+        (VehicleKind.ROCKET, 22, "MAV_TYPE 22 (fixed_wing or multirotor)"),
+        # Generic, a rover, not known: nobody can say.
+        (VehicleKind.ROCKET, 0, ""),
+        (VehicleKind.MULTIROTOR, 10, ""),
+        (VehicleKind.ANY, 1, ""),
+    ],
+)
+def test_a_profile_of_another_kind_of_vehicle_forbids_the_take_off(
+    vehicle: VehicleKind, mav_type: int, told: str
+) -> None:
+    """The shipped default is multirotor: an aeroplane flown with it would be ended in a dive, and
+    its spins not seen."""
+    config = SupervisorConfig(profile=replace(SupervisorConfig().profile, vehicle=vehicle))
+    story = Story(config).flying()
+    story.at(20.0, story.heartbeat(), i.VehicleReport(replace(STANDING, vehicle_type=mav_type)))
+    reasons = block_reasons(config, story.state, START + 20.0)
+    expected = (
+        f"the profile device requests only is for the vehicle {vehicle.value}, and the autopilot "
+        f"reports {told}: set the parameter profile, or `vehicle` in a profile of your own"
+    )
+    assert [one for one in reasons if "MAV_TYPE" in one] == ([expected] if told else [])
 
 
 def test_what_the_vehicle_says_against_flying_is_a_reason_and_in_flight_an_alarm() -> None:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from story import LINK, PROFILES
 
 from chute_ros.errors import ProfileError
-from chute_ros.model import Action
+from chute_ros.model import Action, VehicleKind
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.link import LinkCondition
@@ -533,7 +533,7 @@ FACTS = "lost or rebooted or disarmed or emergency or killed_aloft or motors_sto
 MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate", "vertical_acceleration", "felt_fall")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED, UNMONITORED"
 PROFILE_KEYS = (
-    "profile, minimum_height, below_minimum, low_height, moving_speed, landed_hold, "
+    "profile, vehicle, minimum_height, below_minimum, low_height, moving_speed, landed_hold, "
     "measurements, rules"
 )
 RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, doubted, action, clears"
@@ -679,3 +679,13 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
 )
 def test_each_mistake_is_told_in_full_and_nothing_besides(spoils: str, told: str) -> None:
     assert spoilt(*spoils.split(" -> ")) == [f"line {told}"]
+
+
+def test_what_a_profile_is_for_is_a_word_of_four() -> None:
+    text = "profile: mine\nvehicle: {}\nrules: {{}}\n"
+    for kind in VehicleKind:
+        with pytest.raises(ProfileError) as told:
+            read_profile(text.format(kind.value), "mine.yaml", LINKS)
+        assert "vehicle" not in str(told.value), "only that there is no rule"
+    with pytest.raises(ProfileError, match="line 2: vehicle is 'plane': need any or multirotor"):
+        read_profile(text.format("plane"), "mine.yaml", LINKS)

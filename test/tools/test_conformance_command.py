@@ -137,7 +137,10 @@ def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
     [(signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "the end of its terminal")],
 )
 def test_whoever_ends_it_has_the_device_left_disarmed(number: signal.Signals, by: str) -> None:
+    # Run under nohup, it would be asked to ignore this one.
+    before = signal.signal(number, signal.SIG_DFL)
     with allowed_to_arm("--soak", "600", "--only", "soak") as kit:
+        signal.signal(number, before)
         kit.send_signal(number)
         _, errors = kit.communicate(timeout=60.0)
     assert (kit.returncode, errors) == (3, f"conformance: aborted by {by}\n")

@@ -221,6 +221,7 @@ class AutopilotTracker:
             source=self.device,
             link_state=self.liveness.state,
             system_status=self._system_status,
+            vehicle_type=self.vehicle_type,
             uptime=self._clock.uptime,
             reboot_count=self.reboot_count,
             rebooted_in_flight=self.rebooted_in_flight,
