@@ -37,6 +37,10 @@ def main() -> None:
         sys.exit(f"safety case: {error}")
 
 
+def _tell(what: str) -> None:
+    print(f"safety case: {what}", file=sys.stderr, flush=True)
+
+
 def _make(nodes: list[Node]) -> None:
     shutil.rmtree(_OUT, ignore_errors=True)
     _OUT.mkdir()
@@ -44,8 +48,9 @@ def _make(nodes: list[Node]) -> None:
         single_failures.write(nodes)
         thresholds.write()
         minimum_height.write()
+        _tell("what is installed, and what the index knows of it")
         supply.write(_OUT)
-        print("safety case: pages and print, about half a minute", file=sys.stderr, flush=True)
+        _tell("pages and print, a minute or two")
         strictdoc(
             "--formats=html,html2pdf",
             f"--output-dir={_OUT / 'work'}",

@@ -38,20 +38,22 @@ class NotReadError(Exception):
 
 
 def strictdoc(*arguments: str) -> None:
-    """Run StrictDoc on this folder. NotReadError: it refuses."""
+    """Run StrictDoc on this folder. NotReadError: it refuses, or is not installed."""
     command = [str(TOOLS / "strictdoc"), "export", str(FOLDER), *arguments]
-    # It calls another of its commands by name.
-    ended = subprocess.run(
-        command, env=_environment(), cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    # StrictDoc calls its printing command by name.
+    environment = {**os.environ, "PATH": f"{TOOLS}{os.pathsep}{os.environ['PATH']}"}
+    try:
+        ended = subprocess.run(
+            command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+        )
+    except FileNotFoundError:
+        raise NotReadError(
+            f"there is no {command[0]}: run `make case`, which sets it up"
+        ) from None
     if ended.returncode:
         lines = (ended.stdout + ended.stderr).splitlines()
         told = [one for one in lines if one.startswith("error: ")] or lines[-12:]
         raise NotReadError("\n".join(told))
-
-
-def _environment() -> dict[str, str]:
-    return {**os.environ, "PATH": f"{TOOLS}{os.pathsep}{os.environ['PATH']}"}
 
 
 def read() -> list[Node]:
