@@ -1,11 +1,11 @@
-"""Ctrl-C while a process only imports, and while what must be ended is being made."""
+"""Ctrl-C while a process only imports, and while what must not be cut in two is being done."""
 
 from __future__ import annotations
 
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 from typing import Any
 
@@ -34,14 +34,19 @@ def _is_usual(number: signal.Signals, handler: object) -> bool:
 
 
 class CtrlC:
-    """A handler of SIGINT that raises KeyboardInterrupt, as Python's own does, but may be held.
+    """A handler of a signal that raises KeyboardInterrupt, as Python's own of SIGINT does, but may
+    be held.
 
     last_resort: called so many seconds later, in a thread of its own, where that was swallowed on
-    its way or the end itself hangs.
+    its way or the end itself hangs. error: what it raises instead.
     """
 
-    def __init__(self, last_resort: tuple[float, Callable[[], Any]] | None = None) -> None:
-        self._held, self._last_resort = False, last_resort
+    def __init__(
+        self,
+        last_resort: tuple[float, Callable[[], Any]] | None = None,
+        error: Callable[[], BaseException] = KeyboardInterrupt,
+    ) -> None:
+        self._held, self._last_resort, self._error = False, last_resort, error
         #: Somebody pressed it.
         self.came = False
 
@@ -58,15 +63,27 @@ class CtrlC:
             timer.start()
         self.came = True
         if not self._held:
-            raise KeyboardInterrupt
+            raise self._error()
 
     @contextmanager
     def held(self) -> Iterator[None]:
         """It comes afterwards: what has begun and nobody knows yet would never be ended."""
-        self._held = True
+        before, self._held = self._held, True
         try:
             yield
         finally:
-            self._held = False
-        if self.came:
-            raise KeyboardInterrupt
+            self._held = before
+        if self.came and not before:
+            raise self._error()
+
+
+@contextmanager
+def in_one_piece() -> Iterator[None]:
+    """What ends this process comes afterwards, if a CtrlC takes it: raised where rclpy makes one
+    of its objects it leaves half of it behind, which complains when it is collected."""
+    ends = {signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with ExitStack() as held:
+        for one in ends:
+            if isinstance(one, CtrlC):
+                held.enter_context(one.held())
+        yield

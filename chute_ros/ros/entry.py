@@ -8,6 +8,7 @@ import importlib
 import os
 import signal
 import sys
+from functools import partial
 from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
@@ -46,7 +47,7 @@ def run(name: str, place: str, actions: bool = False) -> None:
 
     node = executor = None
     # Before ROS, whose own handler calls it.
-    ctrl_c = CtrlC()
+    ctrl_c = CtrlC((_ENDS_WITHIN, partial(signal.raise_signal, signal.SIGALRM)))
     ctrl_c.install()
     try:
         limit_memory()
@@ -62,7 +63,10 @@ def run(name: str, place: str, actions: bool = False) -> None:
         # 30 ms.
         gc.collect()
         gc.freeze()
-        executor.spin()
+        # ROS, which it shuts down as well, ends this between two callbacks: what keeps a state or
+        # writes a black box is not cut in two.
+        with ctrl_c.held():
+            executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the usual ways to end a node
     except RuntimeError as error:

@@ -8,6 +8,7 @@ import rclpy
 from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
+from chute_ros.interrupts import in_one_piece
 from chute_ros.ros.middleware import set_up_middleware
 
 #: How long a service may take to be offered, and to answer, s.
@@ -31,7 +32,8 @@ def call_action(namespace: str, name: str) -> str:
                 "that has it (make sim) in the same ROS domain"
             )
         answer = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(node, answer, timeout_sec=_WITHIN)
+        with in_one_piece():
+            rclpy.spin_until_future_complete(node, answer, timeout_sec=_WITHIN)
         if not answer.done():
             raise NotDoneError(f"no answer within {_WITHIN:g} s")
         if not answer.result().success:

@@ -15,6 +15,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.errors import ChuteError
+from chute_ros.interrupts import in_one_piece
 from chute_ros.ros import messages, qos
 from chute_ros.ros.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
@@ -46,6 +47,10 @@ class Director:
         self.reports: list[tuple[float, ActionReport]] = []
         self.track: list[tuple[float, float]] = []
         set_up_middleware()
+        with in_one_piece():
+            self._join(namespace)
+
+    def _join(self, namespace: str) -> None:
         rclpy.init(args=[])
         self.node = Node("director", namespace=namespace)
         self._executor = SingleThreadedExecutor()
@@ -104,7 +109,8 @@ class Director:
             if time.monotonic() >= end:
                 logs = "\n".join(self._processes.tail(name) for name in self._processes.names())
                 raise StepFailedError(f"{what}: not within {seconds:g} s\n{logs}")
-            self._executor.spin_once(timeout_sec=0.05)
+            with in_one_piece():
+                self._executor.spin_once(timeout_sec=0.05)
 
     def arm(self, seconds: float) -> None:
         """Call safety/arm, again with each new picture of a parachute until it succeeds;

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from chute_ros.errors import ChuteError
+from chute_ros.interrupts import CtrlC
 from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
 from chute_ros.plain_text import plain
@@ -74,7 +75,7 @@ def main() -> None:
         processes = Processes(Path(scratch), _new_home())
         # As a Ctrl-C does, of which the entry knows that it came.
         at_ctrl_c = signal.getsignal(signal.SIGINT)
-        signal.signal(signal.SIGTERM, at_ctrl_c if callable(at_ctrl_c) else _end)
+        signal.signal(signal.SIGTERM, at_ctrl_c if isinstance(at_ctrl_c, CtrlC) else CtrlC())
         try:
             with (
                 _alone(chosen.namespace),
@@ -133,10 +134,6 @@ def _namespace(text: str) -> str:
             "example /sim"
         )
     return text
-
-
-def _end(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _environment() -> str:

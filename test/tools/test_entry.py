@@ -140,6 +140,80 @@ def test_one_that_was_swallowed_ends_it_all_the_same():
     assert (done.returncode, done.stderr) == (130, "chute: interrupted\n")
 
 
+#: The signal comes while rclpy makes one of its objects, half of which would complain when it is
+#: collected.
+HALF_MADE = """
+import signal
+import sys
+import types
+from pathlib import Path
+
+from rclpy.task import Future
+
+make = Future.__init__
+
+
+def make_slowly(self, *arguments, **named):
+    if spins:
+        signal.raise_signal(signal.{number})
+    make(self, *arguments, **named)
+
+
+def due():
+    global spins
+    spins = True
+    print("due", flush=True)
+
+
+def director():
+    director = Director("/half_made", Processes(Path("/nowhere")))
+    director.node.create_timer(0.01, due)
+    try:
+        director.until("it goes on", 60.0, lambda: False)
+    finally:
+        director.close()
+
+
+def session():
+    with opened("/half_made") as session:
+        session.node.create_timer(0.01, due)
+        with full_screen():
+            session.until(lambda: False, 60.0)
+
+
+spins = False
+Future.__init__ = make_slowly
+from chute_ros.tools.chute.screen import full_screen
+from chute_ros.tools.chute.session import opened
+from chute_ros.tools.demo_director import Director
+from chute_ros.tools.entry import run
+from chute_ros.tools.processes import Processes
+
+module = types.ModuleType("chute_ros.tools.half_made")
+module.main = {place}
+sys.modules[module.__name__] = module
+run("half_made", "half_made")
+"""
+
+
+@pytest.mark.parametrize(
+    ("place", "number", "code", "told"),
+    [
+        ("director", "SIGINT", 130, "half_made: interrupted\n"),
+        ("session", "SIGINT", 130, "half_made: interrupted\n"),
+        ("session", "SIGTERM", 143, ""),
+    ],
+)
+def test_in_the_middle_of_what_rclpy_makes(place, number, code, told):
+    command = [sys.executable, "-c", HALF_MADE.format(place=place, number=number)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
+    )
+    assert (done.returncode, done.stderr) == (code, told)
+    # The turn in which it came is the second, and whole.
+    assert done.stdout.count("due\n") == 2
+
+
 def test_an_error_of_another_cause_is_one():
     code = BINDING.format(number="signal.SIGCONT")
     command = [sys.executable, "-c", code]

@@ -12,11 +12,12 @@ import termios
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import partial
 
 from rich.console import Console
 from rich.text import Text
 
+from chute_ros.interrupts import CtrlC
 from chute_ros.tools.chute.status_text import Line
 from chute_ros.tools.chute.watch_text import KEYS, Page
 
@@ -32,6 +33,8 @@ _ANEW = 10.0
 _HANGING = 8
 #: The end of a line that needs more rows than it may take.
 _CUT = " ..."
+#: The exit code of what a SIGTERM ended, as shells have it.
+_ENDED = 128 + signal.SIGTERM
 _OPEN, _CLOSE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
 
@@ -72,7 +75,7 @@ def wants_to_quit() -> bool:
 def full_screen() -> Iterator[Screen]:
     """The terminal is as before at the end, whatever ends it."""
     keys = termios.tcgetattr(sys.stdin) if sys.stdin.isatty() else None
-    before = signal.signal(signal.SIGTERM, _end)
+    before = signal.signal(signal.SIGTERM, CtrlC(error=partial(SystemExit, _ENDED)))
     try:
         if keys is not None:
             tty.setcbreak(sys.stdin)
@@ -84,10 +87,6 @@ def full_screen() -> Iterator[Screen]:
         if keys is not None:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, keys)
         signal.signal(signal.SIGTERM, before)
-
-
-def _end(*_: Any) -> None:
-    sys.exit(128 + signal.SIGTERM)
 
 
 def _rows(page: Page, width: int, height: int) -> list[str]:

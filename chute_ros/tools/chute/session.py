@@ -15,6 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from chute_ros.interrupts import in_one_piece
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import set_up_middleware
 from chute_ros.tools.chute.errors import CommandError
@@ -38,7 +39,8 @@ class Session:
 
     def spin(self, seconds: float = _STEP) -> None:
         """Let one message come, or wait for so long."""
-        self._executor.spin_once(timeout_sec=seconds)
+        with in_one_piece():
+            self._executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition: Callable[[], Any], seconds: float) -> bool:
         """Spin until condition holds; whether it did within seconds."""
@@ -118,7 +120,8 @@ def opened(namespace: str) -> Iterator[Session]:
     try:
         # Ctrl-C is Python's: it ends a wait at once, wherever it is.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        session = Session(namespace, around)
+        with in_one_piece():
+            session = Session(namespace, around)
     except RuntimeError as error:
         text = " ".join(str(error).partition(", at /")[0].split())
         if os.environ.get("ROS_SECURITY_ENABLE") == "true":
