@@ -256,7 +256,7 @@ class VehicleState:
     faults: tuple[str, ...] = ()
 
 
-class VehicleKind(enum.Enum):
+class Airframe(enum.Enum):
     """What a profile of rules is for."""
 
     ANY = "any"
@@ -265,18 +265,20 @@ class VehicleKind(enum.Enum):
     ROCKET = "rocket"
 
 
+#: MAV_TYPE of a VTOL of which nobody tells more (VTOL_FIXEDROTOR).
+VTOL = 22
 #: MAV_TYPE of those with a wing and of those that hover (MAVLink minimal.xml); VTOLs are both.
 _VTOLS = frozenset({*range(19, 26), 47})
 _WITH_A_WING = _VTOLS | {1, 16}
 _HOVER = _VTOLS | {2, 3, 4, 13, 14, 15, 29, 35, 43}
 _MAV_TYPES = {
-    VehicleKind.FIXED_WING: _WITH_A_WING,
-    VehicleKind.MULTIROTOR: _HOVER,
-    VehicleKind.ROCKET: frozenset({9}),
+    Airframe.FIXED_WING: _WITH_A_WING,
+    Airframe.MULTIROTOR: _HOVER,
+    Airframe.ROCKET: frozenset({9}),
 }
 
 
-def kinds_of(mav_type: int) -> tuple[VehicleKind, ...]:
+def airframes_of(mav_type: int) -> tuple[Airframe, ...]:
     """What a vehicle of this MAV_TYPE may be flown as; empty: nobody can say (generic, a type that
     is no aircraft of these)."""
     return tuple(kind for kind, types in _MAV_TYPES.items() if mav_type in types)

@@ -93,8 +93,8 @@ def test_each_kind_of_vehicle_is_of_the_dialects_types():
     names = {number: entry.name for number, entry in dialect.enums["MAV_TYPE"].items()}
     hover = ("ROTOR", "COAXIAL", "HELICOPTER", "TRICOPTER", "VTOL")
     for number, name in names.items():
-        kinds = model.kinds_of(number)
-        assert (model.VehicleKind.MULTIROTOR in kinds) == any(word in name for word in hover), name
+        kinds = model.airframes_of(number)
+        assert (model.Airframe.MULTIROTOR in kinds) == any(word in name for word in hover), name
         wing = "WING" in name or "VTOL" in name
-        assert (model.VehicleKind.FIXED_WING in kinds) == wing, name
-        assert (model.VehicleKind.ROCKET in kinds) == name.endswith("ROCKET"), name
+        assert (model.Airframe.FIXED_WING in kinds) == wing, name
+        assert (model.Airframe.ROCKET in kinds) == name.endswith("ROCKET"), name

@@ -7,14 +7,14 @@ import math
 
 from chute_ros.model import (
     Action,
+    Airframe,
     LinkState,
     ParachuteState,
     ParachuteStatus,
     SafetyFlags,
     TriggerFlags,
-    VehicleKind,
+    airframes_of,
     flag_names,
-    kinds_of,
 )
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
@@ -128,8 +128,8 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
 def _other_kind(config: SupervisorConfig, state: State) -> list[str]:
     """The profile is for another kind of vehicle than the autopilot says to fly."""
     profile, told = config.profile, state.heard.vehicle.vehicle_type
-    kinds = kinds_of(told)
-    if not kinds or profile.vehicle in (VehicleKind.ANY, *kinds):
+    kinds = airframes_of(told)
+    if not kinds or profile.vehicle in (Airframe.ANY, *kinds):
         return []
     fitting = " or ".join(one.value for one in kinds)
     text = (

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from chute_ros.errors import ParameterError, ProfileError
-from chute_ros.model import FIRES, Action, VehicleKind
+from chute_ros.model import FIRES, Action, Airframe
 from chute_ros.supervisor.conditions import CONDITIONS
 from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.gate import OPERATOR
@@ -70,8 +70,8 @@ def _profile(reader: ProfileLines, where: Where) -> Profile:
     if "profile" in entries:
         profile = replace(profile, name=reader.text(entries["profile"], "profile"))
     if "vehicle" in entries:
-        word = reader.choice(entries["vehicle"], "vehicle", [one.value for one in VehicleKind])
-        profile = replace(profile, vehicle=VehicleKind(word))
+        word = reader.choice(entries["vehicle"], "vehicle", [one.value for one in Airframe])
+        profile = replace(profile, vehicle=Airframe(word))
     if "minimum_height" in entries:
         height = reader.number(entries["minimum_height"], "minimum_height", 0.0, HIGHEST_MINIMUM)
         profile = replace(profile, minimum_height=height)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
-from chute_ros.model import Action, VehicleKind
+from chute_ros.model import Action, Airframe
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
 from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
@@ -94,7 +94,7 @@ class Profile:
     name: str
     rules: tuple[Rule, ...]
     #: What it is for.
-    vehicle: VehicleKind = VehicleKind.ANY
+    vehicle: Airframe = Airframe.ANY
     #: m above take-off.
     minimum_height: float = 0.0
     below_minimum: BelowMinimum = BelowMinimum.DEPLOY

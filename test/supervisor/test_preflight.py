@@ -24,6 +24,7 @@ from story import (
 
 from chute_ros.model import (
     Action,
+    Airframe,
     Armed,
     ErrorFlags,
     LinkState,
@@ -31,7 +32,6 @@ from chute_ros.model import (
     ParachuteStatus,
     SafetyFlags,
     TriggerFlags,
-    VehicleKind,
     VehicleState,
 )
 from chute_ros.supervisor import inputs as i
@@ -310,22 +310,22 @@ def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status: int, name: st
 @pytest.mark.parametrize(
     ("vehicle", "mav_type", "told"),
     [
-        (VehicleKind.MULTIROTOR, 2, ""),
-        (VehicleKind.MULTIROTOR, 1, "MAV_TYPE 1 (fixed_wing)"),
-        (VehicleKind.FIXED_WING, 13, "MAV_TYPE 13 (multirotor)"),
-        (VehicleKind.ROCKET, 2, "MAV_TYPE 2 (multirotor)"),
+        (Airframe.MULTIROTOR, 2, ""),
+        (Airframe.MULTIROTOR, 1, "MAV_TYPE 1 (fixed_wing)"),
+        (Airframe.FIXED_WING, 13, "MAV_TYPE 13 (multirotor)"),
+        (Airframe.ROCKET, 2, "MAV_TYPE 2 (multirotor)"),
         # A VTOL is flown by either.
-        (VehicleKind.MULTIROTOR, 22, ""),
-        (VehicleKind.FIXED_WING, 22, ""),
-        (VehicleKind.ROCKET, 22, "MAV_TYPE 22 (fixed_wing or multirotor)"),
+        (Airframe.MULTIROTOR, 22, ""),
+        (Airframe.FIXED_WING, 22, ""),
+        (Airframe.ROCKET, 22, "MAV_TYPE 22 (fixed_wing or multirotor)"),
         # Generic, a rover, not known: nobody can say.
-        (VehicleKind.ROCKET, 0, ""),
-        (VehicleKind.MULTIROTOR, 10, ""),
-        (VehicleKind.ANY, 1, ""),
+        (Airframe.ROCKET, 0, ""),
+        (Airframe.MULTIROTOR, 10, ""),
+        (Airframe.ANY, 1, ""),
     ],
 )
 def test_a_profile_of_another_kind_of_vehicle_forbids_the_take_off(
-    vehicle: VehicleKind, mav_type: int, told: str
+    vehicle: Airframe, mav_type: int, told: str
 ) -> None:
     """The shipped default is multirotor: an aeroplane flown with it would be ended in a dive, and
     its spins not seen."""

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from story import LINK, PROFILES
 
 from chute_ros.errors import ProfileError
-from chute_ros.model import Action, VehicleKind
+from chute_ros.model import Action, Airframe
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.link import LinkCondition
@@ -683,7 +683,7 @@ def test_each_mistake_is_told_in_full_and_nothing_besides(spoils: str, told: str
 
 def test_what_a_profile_is_for_is_a_word_of_four() -> None:
     text = "profile: mine\nvehicle: {}\nrules: {{}}\n"
-    for kind in VehicleKind:
+    for kind in Airframe:
         with pytest.raises(ProfileError) as told:
             read_profile(text.format(kind.value), "mine.yaml", LINKS)
         assert "vehicle" not in str(told.value), "only that there is no rule"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,19 +96,23 @@ _PACKED = {"Q": "Q", "B": "B", "f": "f", "c": "h", "L": "i", "Z": "64s", "N": "1
 _FMT = ("BBnNZ", "Type,Length,Name,Format,Columns")
 
 
-def dataflash(told: Iterable[Told], path: Path) -> Path:
+def dataflash(told: Iterable[Told], path: Path, **parameters: float) -> Path:
     """As ArduCopter writes it: binary, or text by its suffix."""
     write = _text if path.suffix == ".log" else _binary
-    path.write_bytes(b"".join(write(name, values) for name, values in _entries(told)))
+    entries = _entries(told, {"CHUTE_ENABLED": 0.0, **parameters})
+    path.write_bytes(b"".join(write(name, values) for name, values in entries))
     return path
 
 
-def _entries(told: Iterable[Told]) -> Iterable[tuple[str, tuple[Any, ...]]]:
+def _entries(
+    told: Iterable[Told], parameters: Mapping[str, float]
+) -> Iterable[tuple[str, tuple[Any, ...]]]:
     yield "FMT", (128, 89, "FMT", *_FMT)
     for name, (number, form, fields) in ENTRIES.items():
         yield "FMT", (number, 3 + _size(form), name, form, fields)
     yield "MSG", (0, "ArduCopter V4.5.7 (00000000)")
-    yield "PARM", (0, "CHUTE_ENABLED", 0.0)
+    for name, value in parameters.items():
+        yield "PARM", (0, name, value)
     armed, landed = False, True
     for one in told:
         us, message, kind = round(one.at * 1e6), one.message, one.message.get_type()

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from log_bench import FAILS, FAILS_AT, FORMATS, LANDS, Told, flown
+from log_bench import FAILS, FAILS_AT, FORMATS, LANDS, Told, dataflash, flown
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from chute_ros.model import Action
+from chute_ros.model import VTOL, Action
 from chute_ros.tools.judge_log import command, formats, table
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError
@@ -70,6 +70,13 @@ def test_a_fall_is_ended_in_time(name, fallen, tmp_path):
     assert fails_at < kill < fails_at + 1.2
     assert kill <= deploy < kill + 0.6
     assert one.ended < one.log.duration, "what follows is no answer to the release"
+
+
+@pytest.mark.parametrize("name", ["quadplane.bin", "quadplane.log"])
+def test_a_quadplane_is_known_by_its_parameter(name, landed, tmp_path):
+    one = judged(dataflash(landed, tmp_path / name, Q_ENABLE=1.0), "multirotor")
+    assert (one.log.vehicle_type, one.log.profile) == (VTOL, "fixed_wing")
+    assert verdict_of(one).words == "nothing ended the flight"
 
 
 @EACH

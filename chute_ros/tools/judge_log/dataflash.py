@@ -16,6 +16,7 @@ from typing import Any
 
 from pymavlink import DFReader
 
+from chute_ros.model import VTOL
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
@@ -167,7 +168,7 @@ class _Teller:
         """All of it."""
         vehicle_type = self._vehicle_type
         if self._parameters.get("Q_ENABLE", 0) > 0:
-            vehicle_type = dialect.MAV_TYPE_VTOL_FIXEDROTOR
+            vehicle_type = VTOL
         remarks = []
         if "POS" not in self._newest:
             for at, message in self._by_controller or self._by_ahr2:

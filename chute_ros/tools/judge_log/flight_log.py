@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.protocol.firmware import is_aeroplane
-from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.model import Airframe, airframes_of
 
 #: No link carries a message of one kind more often than this, s.
 _APART = 0.02
@@ -55,9 +54,9 @@ class FlightLog:
     @property
     def profile(self) -> str:
         """The shipped profile for what flew."""
-        if self.vehicle_type == dialect.MAV_TYPE_ROCKET:
-            return "rocket"
-        return "fixed_wing" if is_aeroplane(self.vehicle_type) else "multirotor"
+        kinds = airframes_of(self.vehicle_type)
+        fitting = (one for one in (Airframe.ROCKET, Airframe.FIXED_WING) if one in kinds)
+        return next(fitting, Airframe.MULTIROTOR).value
 
 
 class MessageLog:

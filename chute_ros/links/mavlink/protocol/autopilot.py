@@ -18,7 +18,16 @@ from chute_ros.links.mavlink.protocol.stream_watch import Ask, OptionalStreams, 
 from chute_ros.links.mavlink.protocol.targets import Vehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
-from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
+from chute_ros.model import (
+    VTOL,
+    Airframe,
+    Armed,
+    LandedState,
+    LinkState,
+    Reading,
+    VehicleState,
+    airframes_of,
+)
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -92,7 +101,7 @@ class AutopilotTracker:
         self.reboot_count = 0
         self.rebooted_in_flight = False
         #: HEARTBEAT.type.
-        self.vehicle_type = 0
+        self._told_type = 0
         self.settings = AutopilotSettings()
         self.motor_signs = MotorSigns()
         self.round_trip = RoundTrip()
@@ -141,6 +150,14 @@ class AutopilotTracker:
         return self.landed_state is LandedState.ON_GROUND and age < STREAM_SILENCE
 
     @property
+    def vehicle_type(self) -> int:
+        """HEARTBEAT.type; that of a VTOL if EXTENDED_SYS_STATE tells a VTOL state, as ArduPlane's
+        quadplanes say FIXED_WING, or what their users would have a ground station show."""
+        lifts = self._readings.value("vtol_state") > dialect.MAV_VTOL_STATE_UNDEFINED
+        both = {Airframe.FIXED_WING, Airframe.MULTIROTOR} <= {*airframes_of(self._told_type)}
+        return VTOL if lifts and not both else self._told_type
+
+    @property
     def motors_off(self) -> bool:
         """The autopilot's own state shows that the motors do not turn any more."""
         terminated = self._system_status == dialect.MAV_STATE_FLIGHT_TERMINATION
@@ -153,12 +170,12 @@ class AutopilotTracker:
             self.armed_told_at = now
             armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             self.arming_count += armed and self.armed is Armed.DISARMED
-            self.vehicle_type = message.type
+            self._told_type = message.type
             self.motor_signs.armed(armed)
             self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
             self._system_status = message.system_status
             self._readers.targets.vehicle = Vehicle(
-                message.autopilot, message.type, message.custom_mode
+                message.autopilot, self.vehicle_type, message.custom_mode
             )
         changes = self.liveness.heard(now)
         firmware = firmware_of(message.autopilot)

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
 from chute_ros.links.mavlink.protocol.config import KillMethod
-from chute_ros.links.mavlink.protocol.firmware import Firmware, is_aeroplane
+from chute_ros.links.mavlink.protocol.firmware import Firmware
+from chute_ros.model import Airframe, airframes_of
 
 #: AFS_TERM_ACTION of ArduPilot.
 _STOPS, _LANDS = 42, 43
@@ -93,7 +94,7 @@ _REMEDY = {
 
 
 def kill_plan(method: KillMethod, vehicle_type: int, settings: AutopilotSettings) -> KillPlan:
-    """The plan for this autopilot. vehicle_type: HEARTBEAT.type."""
+    """The plan for this autopilot. vehicle_type: AutopilotTracker.vehicle_type."""
     disarm = _forced_disarm(settings)
     terminate = _termination(vehicle_type, settings)
     ways = (disarm, terminate)
@@ -128,7 +129,8 @@ def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
         lands = "AFS_TERM_ACTION is 43: it lands and stops no motor"
         return Way(way, lands, releases, useless=True)
     # A copter that has no AFS, or has it switched off, disarms.
-    aeroplane = is_aeroplane(vehicle_type) or settings.get("HOME_RESET_ALT") is not None
+    wings = Airframe.FIXED_WING in airframes_of(vehicle_type)
+    aeroplane = wings or settings.get("HOME_RESET_ALT") is not None
     obstacle = ""
     if aeroplane and enabled != 1:
         obstacle = f"AFS_ENABLE is {settings.text('AFS_ENABLE')}: termination is refused"

@@ -21,8 +21,9 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.firmware import Firmware, firmware_of, is_aeroplane
+from chute_ros.links.mavlink.protocol.firmware import Firmware, firmware_of
 from chute_ros.links.mavlink.protocol.readings import Readings
+from chute_ros.model import Airframe, airframes_of
 from chute_ros.protocol.mavlink.dialect import dialect
 
 Vector = tuple[float, float, float]
@@ -89,7 +90,7 @@ _OF_OTHERS = {
 
 @dataclass(frozen=True)
 class Vehicle:
-    """What an autopilot flies, by its newest HEARTBEAT."""
+    """What an autopilot flies, by its newest HEARTBEAT; kind: AutopilotTracker.vehicle_type."""
 
     autopilot: int = dialect.MAV_AUTOPILOT_INVALID
     kind: int = dialect.MAV_TYPE_GENERIC
@@ -102,9 +103,9 @@ class Vehicle:
 
     @property
     def arduplane(self) -> bool:
-        """ArduPilot on an aeroplane; its quadplanes say FIXED_WING unless told otherwise."""
+        """ArduPilot on an aeroplane or a VTOL."""
         ardupilot = firmware_of(self.autopilot) is Firmware.ARDUPILOT
-        return ardupilot and is_aeroplane(self.kind)
+        return ardupilot and Airframe.FIXED_WING in airframes_of(self.kind)
 
     @property
     def target_messages(self) -> dict[int, str]:

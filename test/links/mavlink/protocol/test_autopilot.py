@@ -4,11 +4,11 @@ import math
 
 import pytest
 from autopilot_bench import Told, attitude, imu, position
-from link_bench import copter, heartbeat, landed
+from link_bench import ardupilot, copter, heartbeat, landed
 
 from chute_ros.links.mavlink.protocol.autopilot import is_autopilot
 from chute_ros.links.mavlink.protocol.stream_watch import ASKED_FOR
-from chute_ros.model import Armed, LandedState, LinkState
+from chute_ros.model import VTOL, Armed, LandedState, LinkState
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 NAN, INF = math.nan, math.inf
@@ -99,6 +99,21 @@ def test_undefined_landed_state_lets_the_known_one_age():
         told = Told().hear(landed(2), now=1.0).hear(landed(state), now=3.0)
         assert told.at(4.0).landed_state is LandedState.IN_AIR, state
         assert told.at(4.0).landed_state_age == 3.0
+
+
+def test_what_tells_a_vtol_state_is_a_vtol_whatever_type_its_heartbeat_says():
+    """ArduPlane calls a quadplane FIXED_WING where Q_MAV_TYPE is 0 or 1, and what it says else."""
+    for kind in (d.MAV_TYPE_FIXED_WING, d.MAV_TYPE_QUADROTOR, VTOL):
+        told = Told().hear(ardupilot(kind=kind))
+        assert told.at().vehicle_type == kind
+        for state in (d.MAV_VTOL_STATE_MC, d.MAV_VTOL_STATE_FW, d.MAV_VTOL_STATE_TRANSITION_TO_FW):
+            told.hear(d.MAVLink_extended_sys_state_message(state, 2))
+            assert told.at().vehicle_type == VTOL, (kind, state)
+        told.hear(d.MAVLink_extended_sys_state_message(d.MAV_VTOL_STATE_UNDEFINED, 1))
+        assert told.at().vehicle_type == kind
+    for kind in (d.MAV_TYPE_VTOL_DUOROTOR, d.MAV_TYPE_VTOL_TILTROTOR):
+        told = Told().hear(ardupilot(kind=kind), d.MAVLink_extended_sys_state_message(3, 1))
+        assert told.at().vehicle_type == kind
 
 
 def test_each_part_has_its_own_age():
