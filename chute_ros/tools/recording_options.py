@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.plain_text import plain
@@ -57,6 +58,25 @@ def make_each(
         made = False
         complain(program, error)
     return made
+
+
+def write_pages(
+    program: str, description: str | None, ending: str, page: Callable[[list[Path]], str]
+) -> NoReturn:
+    """Run program, which writes an HTML page of each recording beside its first file, with this
+    ending, and prints where. Exit code 0: written; 2: a recording cannot be read, or a page cannot
+    be written."""
+    options = recording_options(program, description)
+    options.add_argument(
+        "--output", type=Path, metavar="HTML", help=f"output file (default: FILE{ending})"
+    )
+
+    def make(files: list[Path], output: Path | None) -> None:
+        path = output or files[0].with_name(f"{files[0].name}{ending}")
+        write(path, page(files))
+        print(path, flush=True)
+
+    sys.exit(0 if make_each(program, options.parse_args(), "one page", make) else 2)
 
 
 def write(path: Path, text: str) -> None:

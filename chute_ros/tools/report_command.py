@@ -6,7 +6,6 @@ and their counters, and the decisions with their reasons and outcomes.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from chute_ros.runtime.topics import safety_told
 from chute_ros.tools.flight_story import DECISION, PERSON, tell
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, read
-from chute_ros.tools.recording_options import make_each, recording_options, write
+from chute_ros.tools.recording_options import write_pages
 from chute_ros.tools.releases import releases
 from chute_ros.tools.replay_picture import vehicle_curves
 from chute_ros.tools.replaying import Replayer
@@ -35,24 +34,7 @@ _APART, _MOST = 0.05, 20_000
 
 def main() -> None:
     """Exit code 0: written; 2: a recording cannot be read, or a page cannot be written."""
-    options = recording_options("report", __doc__)
-    options.add_argument(
-        "--output", type=Path, metavar="HTML", help="output file (default: FILE.html)"
-    )
-    given = options.parse_args()
-    made = make_each(
-        "report",
-        given,
-        "one page",
-        lambda files, output: print(_report(files, output), flush=True),
-    )
-    sys.exit(0 if made else 2)
-
-
-def _report(files: list[Path], output: Path | None) -> Path:
-    path = output or files[0].with_name(f"{files[0].name}.html")
-    write(path, report(files))
-    return path
+    write_pages("report", __doc__, ".html", report)
 
 
 def report(files: list[Path]) -> str:

@@ -7,7 +7,6 @@ measured of each release and of the descent, and lines for what a person must fi
 from __future__ import annotations
 
 import hashlib
-import sys
 from pathlib import Path
 
 from chute_msgs.msg import PersonRequest, SafetyDecision
@@ -15,31 +14,14 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from chute_ros.tools.flight_story import DECISION, PERSON, tell
 from chute_ros.tools.recording import read
-from chute_ros.tools.recording_options import make_each, recording_options, write
+from chute_ros.tools.recording_options import write_pages
 from chute_ros.tools.releases import releases
 from chute_ros.tools.test_card_page import DIAGNOSTICS, card
 
 
 def main() -> None:
     """Exit code 0: written; 2: a recording cannot be read, or a page cannot be written."""
-    options = recording_options("test_card", __doc__)
-    options.add_argument(
-        "--output", type=Path, metavar="HTML", help="output file (default: FILE.card.html)"
-    )
-    given = options.parse_args()
-    made = make_each(
-        "test_card",
-        given,
-        "one card",
-        lambda files, output: print(_written(files, output), flush=True),
-    )
-    sys.exit(0 if made else 2)
-
-
-def _written(files: list[Path], output: Path | None) -> Path:
-    path = output or files[0].with_name(f"{files[0].name}.card.html")
-    write(path, test_card(files))
-    return path
+    write_pages("test_card", __doc__, ".card.html", test_card)
 
 
 def test_card(files: list[Path]) -> str:
