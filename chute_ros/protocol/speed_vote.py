@@ -17,10 +17,11 @@ from chute_ros.model import pressure_altitude
 #: What is compared is that of so long, s, of which this must be told at least, s, by so many
 #: words.
 _OVER, _AT_LEAST, _FEWEST = 1.0, 0.7, 4
-#: A speed is the barometer's rate if it differs by no more than this, m/s, or this part of it.
+#: A speed is the barometer's rate if it differs by no more than this, m/s, or this part of it
+#: (supervisor/contradictions.py has the same two, which this package cannot import).
 _DIFFERS, _OF_RATE = 2.0, 0.5
-#: Two sources by less than this, m/s, may both be right.
-_APART = 5.0
+#: Two sources whose speeds differ by less than this, m/s, may both be right.
+APART = 5.0
 #: It is outvoted once that was so for this long, s, and until it was not so for this long, s.
 _HELD_FOR, _OVER_AFTER = 0.3, 1.0
 
@@ -64,7 +65,7 @@ class SpeedVote:
             most = max(_DIFFERS, _OF_RATE * abs(rate))
             right = [one for one in told if abs(told[one] - rate) <= most]
         for one, mean in told.items():
-            against = one not in right and any(abs(told[each] - mean) >= _APART for each in right)
+            against = one not in right and any(abs(told[each] - mean) >= APART for each in right)
             if against:
                 since, _ = self._against.get(one, (now, now))
                 self._against[one] = since, now

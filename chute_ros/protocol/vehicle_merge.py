@@ -23,7 +23,7 @@ from typing import Any
 
 from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol import vehicle_readings as readings
-from chute_ros.protocol.speed_vote import SpeedVote
+from chute_ros.protocol.speed_vote import APART, SpeedVote
 from chute_ros.protocol.stream_rate import SAID_AFTER, StreamRate
 
 #: The source with chute_msgs/VehicleState, and the one with MAVROS's topics. Both know the
@@ -41,7 +41,11 @@ TELL_INTERVAL = 0.02
 
 #: By how much two sources differ that cannot both be right: part -> place of its value, and m/s,
 #: rad (that of one that tumbles may be a tenth of a second older), m/s^2 (motors shake).
-_DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "acceleration": (0, 6.0)}
+_DISPUTES = {
+    "vertical_speed": (0, APART),
+    "attitude": (3, math.pi / 2.0),
+    "acceleration": (0, 6.0),
+}
 #: By so much more a word may differ from the one before of its own source, each second: six
 #: times the gravity, m/s, and three turns, rad. A force is another at once, when the motors stop.
 _CHANGES = {"vertical_speed": 60.0, "attitude": 6.0 * math.pi, "acceleration": 1e6}
