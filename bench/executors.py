@@ -14,8 +14,8 @@ from bench.command import at_least, run, with_children
 from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
 from bench.on_executor import EXECUTORS
 from bench.process_cost import WATCHED_FOR, idle_costs
-from bench.report import load, summary
-from chute_ros.tools.pages import table
+from bench.report import load
+from chute_ros.tools.pages import summary, table
 from chute_ros.tools.processes import Processes
 
 HEADING = "Executors"

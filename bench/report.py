@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import os
-import statistics
 from collections.abc import Sequence
 
 from chute_ros.tools.machine import machine
-
-
-def summary(values: Sequence[float]) -> tuple[float, float, float]:
-    """Median, 99th percentile (nearest rank: of fewer than 100 the largest), largest."""
-    ordered = sorted(values)
-    return statistics.median(ordered), ordered[math.ceil(0.99 * len(ordered)) - 1], ordered[-1]
+from chute_ros.tools.pages import summary
 
 
 def ratios(values: Sequence[float], base: Sequence[float]) -> tuple[str, str]:

@@ -16,13 +16,13 @@ from functools import partial
 from bench.command import at_least, run, with_children
 from bench.person import Person
 from bench.process_cost import cpu_time, resident_memory
-from bench.report import load, summary
+from bench.report import load
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.registered import module_of
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.pages import table
+from chute_ros.tools.pages import summary, table
 from chute_ros.tools.processes import Processes, ros_arguments
 
 HEADING = "A vehicle"

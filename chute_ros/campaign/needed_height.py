@@ -64,6 +64,12 @@ class Fall:
         """From the failure to the canopy that carries; all, if it touched down before, m."""
         return self.height if math.isnan(self.carried.lost) else self.carried.lost
 
+    @property
+    def parts(self) -> tuple[float, float, float]:
+        """What is lost until it is noticed, in the chain, and while the canopy opens, m."""
+        noticed, released = self.noticed.lost, self.released.lost
+        return noticed, released - noticed, self.lost - released
+
     def is_saved(self, soft: float) -> bool:
         """It came down under its canopy, no faster than this, m/s."""
         carried = not math.isnan(self.carried.after)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import statistics
 from collections import Counter
 from collections.abc import Mapping
 
@@ -13,7 +11,7 @@ from chute_ros.campaign.rare import OfEach
 from chute_ros.campaign.scenario import MOST_FAULTS
 from chute_ros.protocol.vehicle_merge import FRESH
 from chute_ros.tools.campaign_picture import groups_of
-from chute_ros.tools.pages import table
+from chute_ros.tools.pages import summary, table
 
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
@@ -152,11 +150,8 @@ def _delays(tally: Tally) -> str:
     head = ("vehicle", "flights", "median", "99th percentile", "largest")
     rows = []
     for name, some in groups_of(tally.lines).items():
-        delays = sorted(line.release_delay for line in some)
-        lost = sorted(line.height_lost for line in some)
-        high = delays[math.ceil(0.99 * len(delays)) - 1]
-        times = (statistics.median(delays), high, delays[-1])
-        heights = (statistics.median(lost), lost[-1])
-        told = (*(f"{one:.2f} s" for one in times), *(f"{one:.1f} m" for one in heights))
+        times = summary([line.release_delay for line in some])
+        middle, _, most = summary([line.height_lost for line in some])
+        told = (*(f"{one:.2f} s" for one in times), f"{middle:.1f} m", f"{most:.1f} m")
         rows.append((name, str(len(some)), *told))
     return table((*head, "height lost: median", "most"), rows)

@@ -29,7 +29,7 @@ from chute_ros.tools.compare_words import (
     RULES,
     SHORT,
 )
-from chute_ros.tools.pages import table
+from chute_ros.tools.pages import summary, table
 
 #: So many seeds of flights are named.
 _MOST_NAMED = 8
@@ -160,8 +160,8 @@ def _delays(plain: Sequence[Compared]) -> str:
 def _spread(values: list[float], unit: str) -> tuple[str, str]:
     if not values:
         return "", ""
-    high = sorted(values)[math.ceil(0.99 * len(values)) - 1]
-    return f"{statistics.median(values):.2f} {unit}", f"{high:.2f} {unit}"
+    middle, high, _ = summary(values)
+    return f"{middle:.2f} {unit}", f"{high:.2f} {unit}"
 
 
 def _medians(pairs: list[tuple[float, float]]) -> tuple[str, str]:

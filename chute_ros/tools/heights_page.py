@@ -15,10 +15,7 @@ from chute_ros.campaign.heights import WANTED, Campaign, Found
 from chute_ros.campaign.needed_height import CEILING, Fall
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.tools.heights_words import ASSUMPTIONS, HOW, INTRODUCTION, WITH_FAULTS
-from chute_ros.tools.pages import table
-
-#: Of times, as in the campaign's page.
-_HIGH = 0.99
+from chute_ros.tools.pages import summary, table
 
 
 @dataclass(frozen=True)
@@ -122,23 +119,14 @@ def heights(every: Sequence[Found]) -> str:
     head = ("failure", "median", "bound", "of such failures at least")
     rows = []
     for one in every:
-        lost = " + ".join(f"{statistics.median(values):.1f}" for values in _parts(one) if values)
+        parts = zip(*(fall.parts for fall in one.lowest), strict=True)
+        lost = " + ".join(f"{statistics.median(values):.1f}" for values in parts)
         saved, least = one.usual_saved
         told = f"{saved} of {len(one.needed)} (at least {_percent(least)})"
         middle = statistics.median(one.needed) if one.needed else math.nan
         needs = (_m(middle), f"**{_m(one.bound)}**", _share(one))
         rows.append((_name(one), *needs, f"{lost} m" if lost else "", told))
     return table((*head, "noticed + chain + opening", "saved from the usual heights"), rows)
-
-
-def _parts(found: Found) -> list[list[float]]:
-    """The height lost until it is noticed, in the chain, and while the canopy opens, m."""
-    falls = found.lowest
-    return [
-        [one.noticed.lost for one in falls],
-        [one.released.lost - one.noticed.lost for one in falls],
-        [one.lost - one.released.lost for one in falls],
-    ]
 
 
 #: Of a fall: s.
@@ -157,9 +145,8 @@ def times(every: Sequence[Found]) -> str:
     for found in every:
         cells = []
         for span in _SPANS.values():
-            values = sorted(span(one) for one in found.carried)
-            high = values[math.ceil(_HIGH * len(values)) - 1] if values else 0.0
-            cells.append(f"{statistics.median(values):.2f} / {high:.2f} s" if values else "")
+            values = [span(one) for one in found.carried]
+            cells.append("{:.2f} / {:.2f} s".format(*summary(values)) if values else "")
         rows.append((_name(found), str(len(found.carried)), *cells))
     return table(("failure", "flights", *_SPANS), rows)
 

@@ -103,13 +103,8 @@ def _row(found: Found, scale: float, top: float) -> list[str]:
 
 def _lost(found: Found) -> list[float]:
     """The height that each part takes, m, in the mean of the flights from the least height."""
-    falls = found.lowest
-    if not falls:
-        return [0.0] * len(_PARTS)
-    noticed = statistics.mean(one.noticed.lost for one in falls)
-    released = statistics.mean(one.released.lost for one in falls)
-    carried = statistics.mean(one.lost for one in falls)
-    return [noticed, released - noticed, carried - released]
+    parts = zip(*(fall.parts for fall in found.lowest), strict=True)
+    return [statistics.mean(values) for values in parts] or [0.0] * len(_PARTS)
 
 
 def _line(x: float, y: float, to_x: float, to_y: float, colour: str, wide: float) -> str:

@@ -1,9 +1,12 @@
-"""Pages that tools write: tables, parts of pages, and files that are up to date or not."""
+"""Pages that tools write: tables, what they tell of many values, their parts, and files that are up
+to date or not."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
+import statistics
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +19,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _row(cells: Sequence[str]) -> str:
     return "|" + "|".join(f" {one} " if one else " " for one in cells) + "|"
+
+
+def summary(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, 99th percentile (nearest rank: of fewer than 100 the largest), largest."""
+    ordered = sorted(values)
+    return statistics.median(ordered), ordered[math.ceil(0.99 * len(ordered)) - 1], ordered[-1]
 
 
 def with_part(page: str, what: str, name: str, text: str, order: Iterable[str]) -> str:
