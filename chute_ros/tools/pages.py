@@ -1,5 +1,5 @@
-"""Pages that tools write: tables, what they tell of many values, their parts, and files that are up
-to date or not."""
+"""Pages that tools write: tables, what they tell of many values, their parts, and files that are
+up to date or not."""
 
 from __future__ import annotations
 
