@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import cycle
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import Result, Risk, Verdict
-from chute_ros.conformance.session import Allowed, Ended, Found, Session
-from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.conformance.clause import Risk, Verdict
+from chute_ros.conformance.session import Allowed, Found, Session
 from chute_ros.links.mavlink.conformance import CLAUSES
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench
 from chute_ros.links.mavlink.kit import KIT
@@ -33,7 +32,7 @@ def key() -> tuple[Signer, Verifier]:
     return Signer(bytes(range(32)), clock), Verifier(bytes(range(32)), clock)
 
 
-class Run:
+class Run(KitRun):
     """Kit and device on one line."""
 
     def __init__(
@@ -43,28 +42,7 @@ class Run:
         session: Session[MavlinkBench] | None = None,
     ) -> None:
         self.device = device
-        self.session = session or Session(MavlinkBench(risk), CLAUSES, Allowed(risk))
-        self.line = VirtualLine(self.session, device)  # type: ignore[arg-type]
-
-    def to(self, until: Callable[[], bool] = lambda: False) -> Run:
-        """To its end, or until this holds."""
-        self.line.run(until)
-        return self
-
-    @property
-    def results(self) -> dict[str, Result]:
-        """By clause."""
-        return {one.clause.name: one for one in self.line.events if isinstance(one, Result)}
-
-    def of(self, verdict: Verdict) -> list[str]:
-        """The clauses with this verdict."""
-        return [name for name, one in self.results.items() if one.verdict is verdict]
-
-    @property
-    def problem(self) -> str:
-        """How it ended."""
-        (ended,) = (one for one in self.line.events if isinstance(one, Ended))
-        return ended.problem
+        super().__init__(session or Session(MavlinkBench(risk), CLAUSES, Allowed(risk)), device)
 
 
 def sound(**settings: object) -> ParachuteDevice:

@@ -9,11 +9,11 @@ from itertools import cycle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import SOAK, Result, Risk, Verdict
-from chute_ros.conformance.session import Allowed, Ended, Found, Session
-from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.conformance.clause import SOAK, Risk, Verdict
+from chute_ros.conformance.session import Allowed, Found, Session
 from chute_ros.links.umbilical.conformance import CLAUSES
 from chute_ros.links.umbilical.conformance.bench import UmbilicalBench
 from chute_ros.links.umbilical.conformance.permits import REBOOT, WIPE
@@ -30,7 +30,7 @@ REFERENCE = LAYOUTS["telem57_airbrake_state"]
 OPTIONS = (REBOOT, WIPE)
 
 
-class Run:
+class Run(KitRun):
     """Kit and flight computer on one cable."""
 
     def __init__(
@@ -42,28 +42,7 @@ class Run:
     ) -> None:
         self.device = device
         bench = UmbilicalBench(device.layout, risk, options)
-        self.session = session or Session(bench, CLAUSES, Allowed(risk, options))
-        self.line = VirtualLine(self.session, device)  # type: ignore[arg-type]
-
-    def to(self, until: Callable[[], bool] = lambda: False) -> Run:
-        """To its end, or until this holds."""
-        self.line.run(until)
-        return self
-
-    @property
-    def results(self) -> dict[str, Result]:
-        """By clause."""
-        return {one.clause.name: one for one in self.line.events if isinstance(one, Result)}
-
-    def of(self, verdict: Verdict) -> list[str]:
-        """The clauses with this verdict."""
-        return [name for name, one in self.results.items() if one.verdict is verdict]
-
-    @property
-    def problem(self) -> str:
-        """How it ended."""
-        (ended,) = (one for one in self.line.events if isinstance(one, Ended))
-        return ended.problem
+        super().__init__(session or Session(bench, CLAUSES, Allowed(risk, options)), device)
 
 
 def sound(layout: str = REFERENCE.name, **knobs: object) -> FlightComputer:

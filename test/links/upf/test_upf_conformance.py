@@ -9,10 +9,11 @@ from itertools import cycle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit_run import KitRun, of, problem, results
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import SOAK, Result, Risk, Verdict
-from chute_ros.conformance.session import Allowed, Ended, Session
+from chute_ros.conformance.clause import SOAK, Risk, Verdict
+from chute_ros.conformance.session import Allowed, Session
 from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import DNA, UpfBench
@@ -36,28 +37,14 @@ NAMES = [one.name for one in CLAUSES]
 DEFINITIONS = Definitions(load_data_types("", ""))
 
 
-class Run:
+class Run(KitRun):
     """A controller, a trigger and the kit on one bus."""
 
     def __init__(self, risk: Risk) -> None:
         self.controller, self.trigger = UpfController(DEFINITIONS), UpfTrigger(DEFINITIONS)
         self.bench = UpfBench(DEFINITIONS, risk)
-        self.session = Session(self.bench, CLAUSES, Allowed(risk))
         bus = UpfBus([self.controller, self.trigger])
-        self.line = VirtualLine(self.session, bus)  # type: ignore[arg-type]
-
-
-def results(line: VirtualLine) -> dict[str, Result]:
-    return {one.clause.name: one for one in line.events if isinstance(one, Result)}
-
-
-def of(line: VirtualLine, verdict: Verdict) -> list[str]:
-    return [name for name, one in results(line).items() if one.verdict is verdict]
-
-
-def problem(line: VirtualLine) -> str:
-    (ended,) = (one for one in line.events if isinstance(one, Ended))
-    return ended.problem
+        super().__init__(Session(self.bench, CLAUSES, Allowed(risk)), bus)
 
 
 def simulated(broken: str) -> VirtualLine:

@@ -1,0 +1,53 @@
+"""A run of a conformance kit on a simulated device, and what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Self
+
+from chute_ros.conformance.clause import Result, Verdict
+from chute_ros.conformance.session import Ended, Session
+from chute_ros.conformance.virtual import VirtualLine
+
+
+def results(line: VirtualLine) -> dict[str, Result]:
+    """By clause."""
+    return {one.clause.name: one for one in line.events if isinstance(one, Result)}
+
+
+def of(line: VirtualLine, verdict: Verdict) -> list[str]:
+    """The clauses with this verdict."""
+    return [name for name, one in results(line).items() if one.verdict is verdict]
+
+
+def problem(line: VirtualLine) -> str:
+    """How it ended."""
+    (ended,) = (one for one in line.events if isinstance(one, Ended))
+    return ended.problem
+
+
+class KitRun:
+    """Kit and device on one line."""
+
+    def __init__(self, session: Session[Any], device: Any) -> None:
+        self.session = session
+        self.line = VirtualLine(session, device)
+
+    def to(self, until: Callable[[], bool] = lambda: False) -> Self:
+        """To its end, or until this holds."""
+        self.line.run(until)
+        return self
+
+    @property
+    def results(self) -> dict[str, Result]:
+        """By clause."""
+        return results(self.line)
+
+    def of(self, verdict: Verdict) -> list[str]:
+        """The clauses with this verdict."""
+        return of(self.line, verdict)
+
+    @property
+    def problem(self) -> str:
+        """How it ended."""
+        return problem(self.line)
