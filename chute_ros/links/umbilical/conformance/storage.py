@@ -85,27 +85,30 @@ def _dump_flash(bench: UmbilicalBench) -> Trial:
     return f"{size} bytes"
 
 
-def _interrupts(bench: UmbilicalBench) -> Trial:
+def _dump_within(bench: UmbilicalBench) -> Any:
+    """What comes of <G>, and the places of the dump's first and last line in it."""
     lines = yield from _dumped(bench)
     places = [i for i, one in enumerate(lines) if one.kind in (LINE, DUMP)]
     if not places:
         raise not_tried("nothing comes of <G>")
-    for one in lines[places[0] : places[-1]]:
+    return lines, places[0], places[-1]
+
+
+def _interrupts(bench: UmbilicalBench) -> Trial:
+    lines, first, last = yield from _dump_within(bench)
+    for one in lines[first:last]:
         if one.kind == TELEM:
             raise failed("$TELEM comes within the dump of the flash", [one.packet])
     return "no $TELEM within the dump"
 
 
 def _resumes(bench: UmbilicalBench) -> Trial:
-    lines = yield from _dumped(bench)
-    places = [i for i, one in enumerate(lines) if one.kind in (LINE, DUMP)]
-    if not places:
-        raise not_tried("nothing comes of <G>")
-    after = [one.at for one in lines[places[-1] :] if one.kind == TELEM]
+    lines, _, last = yield from _dump_within(bench)
+    after = [one.at for one in lines[last:] if one.kind == TELEM]
     if not after:
-        last = [one.packet for one in lines[places[-1] :]]
-        raise failed(f"no $TELEM within {_SILENCE:g} s after the dump of the flash", last)
-    return f"{after[0] - lines[places[-1]].at:.2f} s after the dump"
+        packets = [one.packet for one in lines[last:]]
+        raise failed(f"no $TELEM within {_SILENCE:g} s after the dump of the flash", packets)
+    return f"{after[0] - lines[last].at:.2f} s after the dump"
 
 
 def _fram(bench: UmbilicalBench) -> Any:
