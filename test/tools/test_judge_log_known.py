@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from log_bench import FAILS, FAILS_AT, LANDS, flown, tlog
+from log_bench import FAILS, FAILS_AT, LANDED_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command, formats
@@ -23,7 +23,7 @@ def judged(path: Path) -> Verdict:
 
 @pytest.fixture(scope="module")
 def landed(tmp_path_factory) -> Verdict:
-    return judged(tlog(flown(LANDS, 40.0), tmp_path_factory.mktemp("logs") / "well.tlog"))
+    return judged(tlog(flown(LANDS, LANDED_AT), tmp_path_factory.mktemp("logs") / "well.tlog"))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
     assert "| well.tlog | it takes off and lands |" in text
     assert "a motor fails (simulated)" in text
     height = text.partition("released at ")[2].partition(" m")[0]
-    assert 45 < int(height) < 60
+    assert 20 < int(height) < 30
     assert "- none.bin: it is empty" in text
     assert "- well.tlog: some/repo: a/b.tlog" in text
     with pytest.raises(ChuteError, match=r"no line for well\.tlog"):
