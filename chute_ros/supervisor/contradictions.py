@@ -67,6 +67,8 @@ _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
 _LIES_AND_SINKS = 2.5
 #: An estimator that tells more than this share of a fall that is felt does not hide it.
 _TOLD_AS_WELL = 0.5
+#: Of so many moments a mean can be told; cosine of 70 degrees: no wing carries what leans more.
+_FEW, _ON_ITS_SIDE = 4, 0.342
 #: Cosine of 45 degrees: a vehicle that leans less claims no fall.
 _LEANS = 0.7071
 
@@ -176,6 +178,25 @@ def felt_fall(motion: tuple[Moment, ...]) -> float:
             felt += (after[2] - GRAVITY) * passed
             told += 0.0 if math.isnan(after[1] - before[1]) else after[1] - before[1]
     return 0.0 if told < _TOLD_AS_WELL * felt else felt
+
+
+def speed_error(motion: tuple[Moment, ...], barometer: Rise) -> float:
+    """By how much the estimator's vertical speed and the barometer's differ, whichever is the
+    higher, m/s; NaN: not known."""
+    return abs(barometer.rate - _told_meanwhile(motion, barometer))
+
+
+def force_error(motion: tuple[Moment, ...]) -> float:
+    """By how much the force differs from what would hold the vehicle in the attitude of the last
+    second, and speed it up as its estimator tells, m/s^2: near 0 in a turn, in a climb, and as a
+    dive is caught. Of what leans by more than 70 degrees, so much as if it leant by 70. NaN: not
+    known."""
+    known = [one for one in _last(motion, 1.0) if not any(map(math.isnan, one))] if motion else []
+    if len(known) < _FEW or known[-1] is not motion[-1]:
+        return math.nan
+    speeds_up = (known[-1][1] - known[0][1]) / (known[-1][0] - known[0][0])
+    needed = (GRAVITY + speeds_up) / max(fmean([one[3] for one in known]), _ON_ITS_SIDE)
+    return abs(fmean([one[2] for one in known]) - needed)
 
 
 def height_denied(height: float, by_pressure: float) -> str:

@@ -8,13 +8,24 @@ from itertools import pairwise
 from statistics import fmean, median
 from typing import TYPE_CHECKING
 
-from chute_ros.supervisor.contradictions import NO_DROP, NOT_TOLD, Drop, Rise, felt_fall
+from chute_ros.supervisor.contradictions import (
+    NO_DROP,
+    NOT_TOLD,
+    Drop,
+    Rise,
+    felt_fall,
+    force_error,
+    speed_error,
+)
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
+    DERIVED,
     FELT_FALL,
+    FORCE_ERROR,
     HEIGHT,
     PRESSURE_ALTITUDE,
+    SPEED_ERROR,
     VERTICAL_ACCELERATION,
     VERTICAL_SPEED,
 )
@@ -29,6 +40,8 @@ _CLIMB_OVER = 0.4
 PARTS = {"tilt_deg": "attitude"}
 #: What a barometer told longer ago says nothing of a fall, s.
 _DROP_WITHIN = 12.0
+#: Which of those that tell them comes anew with each sample.
+_BESIDES = {SPEED_ERROR: 1, FORCE_ERROR: 0}
 _HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
 
 
@@ -44,6 +57,8 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == FELT_FALL:
         why = unusable(config, state, ACCELERATION, now)
         return (math.nan, why) if why else (felt_fall(state.heard.motion), "")
+    if name in _BESIDES:
+        return _besides(config, state, name, now)
     known = state.measured(name)
     why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
@@ -136,6 +151,8 @@ def samples(config: SupervisorConfig, state: State, name: str, value: float, now
         config.profile.limits[VERTICAL_SPEED], now
     ):
         told = VERTICAL_SPEED
+    elif name in _BESIDES:
+        told = DERIVED[name][_BESIDES[name]]
     elif name == CLIMB_RATE or value != state.measured(name).value:
         by_pressure = not math.isnan(pressure_rate(config, state, now))
         told = PRESSURE_ALTITUDE if by_pressure else HEIGHT
@@ -163,6 +180,19 @@ def _vertical_acceleration(
     if not told or told[-1][0] - told[0][0] < _CLIMB_OVER:
         return math.nan, "too few vertical speeds that can be used"
     return _slope(tuple(told)), ""
+
+
+def _besides(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    """SPEED_ERROR or FORCE_ERROR."""
+    motion = state.heard.motion
+    if name == SPEED_ERROR:
+        value = speed_error(motion, pressure_change(config, state, now))
+    else:
+        value = force_error(motion)
+    whys = [unusable(config, state, one, now) for one in DERIVED[name]]
+    too_few = "too little is told at the same time" if math.isnan(value) else ""
+    why = next(filter(None, whys), too_few)
+    return (math.nan, why) if why else (value, "")
 
 
 def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:

@@ -530,7 +530,14 @@ def test_what_a_mistake_stands_for_meanwhile_is_no_second_mistake() -> None:
 
 
 FACTS = "lost or rebooted or disarmed or emergency or killed_aloft or motors_stopped"
-MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate", "vertical_acceleration", "felt_fall")
+MEASUREMENTS = (
+    *STANDARD_LIMITS,
+    "climb_rate",
+    "vertical_acceleration",
+    "felt_fall",
+    "speed_error",
+    "force_error",
+)
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED, UNMONITORED"
 PROFILE_KEYS = (
     "profile, vehicle, minimum_height, below_minimum, low_height, moving_speed, landed_hold, "

@@ -83,6 +83,56 @@ def test_an_accelerometer_that_is_shaken_and_draws_its_estimator_along_ends_no_f
     assert teller.story.fired() == []
 
 
+def turning(
+    teller: Teller, sink: float, force: float, runs_away: float = 0.0, **told: Any
+) -> float:
+    """For 6 s it sinks so fast, m/s, carried by this force, m/s^2. The speed that is told starts
+    from 0, and runs away by so much, m/s^2; how long it took to the deploy, s, or NaN."""
+    begun = teller.story.t
+    for k in range(60):
+        lost, speed = sink * EVERY * k, runs_away * EVERY * k
+        parts = {"height": HIGH, "vertical_speed": speed + teller.noise(0.2), "tilt": 3.0, **told}
+        teller.tell(**parts, force=force + teller.noise(0.3), true_height=HIGH - lost)
+        if deployed(teller):
+            return teller.story.t - begun
+    return math.nan
+
+
+@pytest.mark.parametrize(("force", "tilt"), [(13.0, 3.0), (24.0, 3.0), (13.0, 65.0)])
+@pytest.mark.parametrize("sink", [9.0, 16.0])
+@pytest.mark.parametrize(
+    ("runs_away", "target"), [(0.0, True), (0.0, False), (1.0, False), (-6.0, False)]
+)
+def test_a_spin_that_its_estimator_does_not_tell_is_told_by_force_and_barometer(
+    force: float, tilt: float, sink: float, runs_away: float, target: bool
+) -> None:
+    """Upright it would be carried by its weight, and at 65 degrees by more than twice that."""
+    told = {"target_vertical_speed": 0.0, "attitude_error": 1.0} if target else {}
+    took = turning(up("fixed_wing"), sink, force, runs_away, **told, tilt=tilt)
+    # One that runs away downwards is right for a moment.
+    assert took <= (3.0 if runs_away >= 0.0 else 4.5)
+
+
+@pytest.mark.parametrize(
+    ("sink", "force", "told"),
+    [
+        # A steep turn that is flown downwards, and told; and one that is level.
+        (12.0, 16.0, {"vertical_speed": -12.0, "tilt": 55.0}),
+        (0.0, 19.6, {"vertical_speed": 0.0, "tilt": 60.0}),
+        # An estimator that hovers on in a descent, in which nothing turns.
+        (5.0, 9.8, {}),
+        # A barometer that is wrong in a level turn of 45 degrees.
+        (9.0, 13.9, {"tilt": 45.0}),
+        # A barometer that is wrong by gusts, and an accelerometer that is shaken.
+        (4.0, 15.0, {}),
+    ],
+)
+def test_what_turns_on_purpose_and_what_only_one_origin_tells_ends_no_flight(
+    sink: float, force: float, told: dict[str, Any]
+) -> None:
+    assert math.isnan(turning(up("fixed_wing"), sink, force, **told))
+
+
 def test_a_height_that_the_barometer_denies_is_told_in_flight() -> None:
     teller = up("multirotor", barometer_stops=0.0)
     told = [one for one in teller.story.alarms() if one.startswith("height is contradicted")]

@@ -23,7 +23,7 @@ from chute_ros.errors import CampaignError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools import campaign_cluster, campaign_command
 
-SEEDS = range(100, 124)
+SEEDS, BUNDLE = range(100, 114), 2
 PACKAGE = Path(chute_ros.__file__).parent
 
 
@@ -39,7 +39,7 @@ def cluster():
 @pytest.fixture(autouse=True)
 def small_bundles(monkeypatch):
     """Many, of a few flights."""
-    monkeypatch.setattr(campaign_cluster, "_BUNDLE", 3)
+    monkeypatch.setattr(campaign_cluster, "_BUNDLE", BUNDLE)
 
 
 @pytest.fixture
@@ -94,7 +94,7 @@ def test_a_worker_that_dies_costs_its_bundle_again_and_nothing_else(cluster, by_
     assert died[0] not in left
     assert kept(tally) == by_one_process
     assert steps.count(("processing", "released")) > 0, "it died with a bundle"
-    bundles, done = len(SEEDS) // 3, steps.count(("processing", "memory"))
+    bundles, done = len(SEEDS) // BUNDLE, steps.count(("processing", "memory"))
     assert bundles <= done <= bundles + 1, "one more, if it died with a result on its way"
 
 
@@ -119,8 +119,8 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
         f"campaign: the scheduler at {cluster.address} is gone; the flights until then are "
         "reported, and --resume FILE continues from them"
     )
-    first = re.search(r"^(\d+) of 24 flights in", capsys.readouterr().out, re.M)
-    assert 4 <= int(first[1]) < 24
+    first = re.search(rf"^(\d+) of {len(SEEDS)} flights in", capsys.readouterr().out, re.M)
+    assert 4 <= int(first[1]) < len(SEEDS)
     monkeypatch.setattr(campaign_command._Progress, "look", look)
     monkeypatch.setattr(flights.Tally, "__eq__", None)
     monkeypatch.setattr(
