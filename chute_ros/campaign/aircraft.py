@@ -56,7 +56,7 @@ def _kind_of(scenario: Scenario) -> AutopilotKind:
     """Whose autopilot it is; the same one flies multirotors and aeroplanes."""
     kind = KINDS[scenario.autopilot.kind]
     if scenario.profile == "fixed_wing" and kind.vehicle_type == dialect.MAV_TYPE_QUADROTOR:
-        return replace(kind, vehicle_type=dialect.MAV_TYPE_FIXED_WING)
+        return replace(kind, vehicle_type=dialect.MAV_TYPE_FIXED_WING, vtol_state=0)
     return kind
 
 

@@ -303,7 +303,7 @@ class AutopilotDevice(AutopilotTelemetry):
         landed = dialect.MAV_LANDED_STATE_IN_AIR
         if not self._takes_itself_to_fly:
             landed = dialect.MAV_LANDED_STATE_ON_GROUND
-        return dialect.MAVLink_extended_sys_state_message(0, landed)
+        return dialect.MAVLink_extended_sys_state_message(self.kind.vtol_state, landed)
 
     def _sys_status(self) -> object:
         millivolts = round(self.battery.voltage(self.now) * 1000.0)

@@ -46,6 +46,8 @@ class AutopilotKind:
     early_in_air: float = math.inf
     #: HEARTBEAT.custom_mode.
     custom_mode: int = 0
+    #: EXTENDED_SYS_STATE.vtol_state: ArduCopter always says MC, a quadplane FW on its wing.
+    vtol_state: int = dialect.MAV_VTOL_STATE_UNDEFINED
     #: What is commanded comes with NAV_CONTROLLER_OUTPUT alone.
     targets_of_a_wing: bool = False
 
@@ -75,11 +77,12 @@ ARDUCOPTER = AutopilotKind(
     termination=Termination.DISARMS,
     disarm_refused=dialect.MAV_RESULT_FAILED,
     parameters=_ARDUPILOT,
+    vtol_state=dialect.MAV_VTOL_STATE_MC,
 )
 ARDUPLANE = AutopilotKind(
     "arduplane",
     dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-    dialect.MAV_TYPE_VTOL_RESERVED2,
+    dialect.MAV_TYPE_FIXED_WING,  # a quadplane's as well, unless Q_MAV_TYPE says otherwise
     Termination.NEEDS_AFS,
     dialect.MAV_RESULT_FAILED,
     {
@@ -94,5 +97,6 @@ ARDUPLANE = AutopilotKind(
     early_in_air=0.05,
     custom_mode=15,  # GUIDED
     targets_of_a_wing=True,
+    vtol_state=dialect.MAV_VTOL_STATE_FW,
 )
 KINDS = {kind.name: kind for kind in (GENERIC, PX4, ARDUCOPTER, ARDUPLANE)}

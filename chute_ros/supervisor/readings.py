@@ -40,8 +40,8 @@ _CLIMB_OVER = 0.4
 PARTS = {"tilt_deg": "attitude"}
 #: What a barometer told longer ago says nothing of a fall, s.
 _DROP_WITHIN = 12.0
-#: Which of those that tell them comes anew with each sample.
-_BESIDES = {SPEED_ERROR: 1, FORCE_ERROR: 0}
+#: What sets an estimator against others.
+_ERRORS = (SPEED_ERROR, FORCE_ERROR)
 _HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
 
 
@@ -57,8 +57,8 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == FELT_FALL:
         why = unusable(config, state, ACCELERATION, now)
         return (math.nan, why) if why else (felt_fall(state.heard.motion), "")
-    if name in _BESIDES:
-        return _besides(config, state, name, now)
+    if name in _ERRORS:
+        return _error(config, state, name, now)
     known = state.measured(name)
     why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
@@ -145,14 +145,12 @@ def samples(config: SupervisorConfig, state: State, name: str, value: float, now
     """How many have come so far of what tells a measurement that can be used. value: what was read
     of it, which may be what the heights tell in its place."""
     speed = state.measured(VERTICAL_SPEED)
-    if name == FELT_FALL:
-        told = ACCELERATION
+    if name in (FELT_FALL, *_ERRORS):
+        told = DERIVED[name][0]
     elif name == VERTICAL_ACCELERATION and not speed.unusable(
         config.profile.limits[VERTICAL_SPEED], now
     ):
         told = VERTICAL_SPEED
-    elif name in _BESIDES:
-        told = DERIVED[name][_BESIDES[name]]
     elif name == CLIMB_RATE or value != state.measured(name).value:
         by_pressure = not math.isnan(pressure_rate(config, state, now))
         told = PRESSURE_ALTITUDE if by_pressure else HEIGHT
@@ -182,17 +180,15 @@ def _vertical_acceleration(
     return _slope(tuple(told)), ""
 
 
-def _besides(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
-    """SPEED_ERROR or FORCE_ERROR."""
-    motion = state.heard.motion
-    if name == SPEED_ERROR:
-        value = speed_error(motion, pressure_change(config, state, now))
+def _error(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    for one in DERIVED[name]:
+        if why := unusable(config, state, one, now):
+            return math.nan, why
+    if name == FORCE_ERROR:
+        error = force_error(state.heard.motion)
     else:
-        value = force_error(motion)
-    whys = [unusable(config, state, one, now) for one in DERIVED[name]]
-    too_few = "too little is told at the same time" if math.isnan(value) else ""
-    why = next(filter(None, whys), too_few)
-    return (math.nan, why) if why else (value, "")
+        error = speed_error(state.heard.motion, pressure_change(config, state, now))
+    return error, "too little is told at the same time" if math.isnan(error) else ""
 
 
 def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:

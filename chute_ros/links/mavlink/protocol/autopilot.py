@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
-from chute_ros.links.mavlink.protocol.firmware import firmware_of
+from chute_ros.links.mavlink.protocol.firmware import firmware_of, shows_vtol
 from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
@@ -20,13 +20,11 @@ from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
 from chute_ros.model import (
     VTOL,
-    Airframe,
     Armed,
     LandedState,
     LinkState,
     Reading,
     VehicleState,
-    airframes_of,
 )
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
@@ -100,8 +98,8 @@ class AutopilotTracker:
         self.liveness = Liveness(limits)
         self.reboot_count = 0
         self.rebooted_in_flight = False
-        #: HEARTBEAT.type.
-        self._told_type = 0
+        #: HEARTBEAT.type, and that its VTOL state has shown otherwise.
+        self._told_type, self._shown_vtol = 0, False
         self.settings = AutopilotSettings()
         self.motor_signs = MotorSigns()
         self.round_trip = RoundTrip()
@@ -151,11 +149,9 @@ class AutopilotTracker:
 
     @property
     def vehicle_type(self) -> int:
-        """HEARTBEAT.type; that of a VTOL if EXTENDED_SYS_STATE tells a VTOL state, as ArduPlane's
+        """HEARTBEAT.type; VTOL where EXTENDED_SYS_STATE has shown that it is one, as ArduPlane's
         quadplanes say FIXED_WING, or what their users would have a ground station show."""
-        lifts = self._readings.value("vtol_state") > dialect.MAV_VTOL_STATE_UNDEFINED
-        both = {Airframe.FIXED_WING, Airframe.MULTIROTOR} <= {*airframes_of(self._told_type)}
-        return VTOL if lifts and not both else self._told_type
+        return VTOL if self._shown_vtol else self._told_type
 
     @property
     def motors_off(self) -> bool:
@@ -217,6 +213,8 @@ class AutopilotTracker:
         self._streams.received(len(message.get_msgbuf()))
         if not self._readers.read(message, now):
             return False
+        if kind == "EXTENDED_SYS_STATE":
+            self._shown_vtol |= shows_vtol(self._told_type, message.vtol_state)
         self._rates.setdefault(kind, StreamRate()).heard(now)
         return kind not in _TOLD_WITH_THE_NEXT
 
