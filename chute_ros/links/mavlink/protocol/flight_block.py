@@ -5,7 +5,8 @@ above where it was armed: some autopilots say IN_AIR as soon as a take-off is or
 Else the autopilot's own ON_GROUND is believed while it is fresh. An autopilot refuses a plain
 disarm in flight; a forced one, which it does not refuse, follows only where the vehicle was armed
 while flight was blocked already, and its height shows that it has not left the ground since. One
-that arms in the air (an autopilot that starts anew, the motor of a glider) has left it.
+that arms in the air (an autopilot that starts anew, the motor of a glider) has left it; one that
+was disarmed and did not move has not, whatever it says: what has no motors falls or glides.
 """
 
 from __future__ import annotations
@@ -21,6 +22,11 @@ DISARM_INTERVAL = 0.5
 _FOR_A_MOMENT, _FRESH = 0.3, 1.0
 #: It says IN_AIR as soon as a take-off is ordered, so long before it is seen to arm at most, s.
 _STOOD_WITHIN = 3.0
+#: It stood still if it moved no further than this, m, up or down and over ground, for so long, s;
+#: but not so far from where it last said that it stands, m.
+_STILL, _STILL_OVER_GROUND, _STILL_FOR, _ELSEWHERE = 1.0, 3.0, 2.0, 10.0
+#: A degree of latitude, m.
+_DEGREE = 111_320.0
 #: Home may be set again as it arms, so long after it at most, s.
 _HOME_SET_WITHIN = 1.0
 #: What a height is taken from: the first that is known as it arms. No home moves the first.
@@ -94,13 +100,14 @@ class _Rise:
         #: When it was armed, monotonic s; its height then, and the lowest since.
         self._armed_at = -math.inf
         self._first = self._lowest = math.nan
-        #: When the autopilot last said that it stands, monotonic s.
+        #: When the autopilot last said that it stands, or stood still, monotonic s.
         self._stood_at = -math.inf
+        self._stillness = _Stillness()
         self._higher_since = math.inf
 
     def observe(self, autopilot: AutopilotTracker, now: float) -> bool:
         """The autopilot may have said something; True: it was just seen to arm."""
-        if autopilot.on_ground(now):
+        if self._stillness.stands(autopilot, now):
             self._stood_at = now
         before = self._armings.setdefault(autopilot.device, autopilot.arming_count)
         self._armings[autopilot.device] = autopilot.arming_count
@@ -118,8 +125,7 @@ class _Rise:
         return bool(self._source) and self._newest.age(now) <= _FRESH
 
     def _begin(self, autopilot: AutopilotTracker, now: float) -> None:
-        fresh = (name for name in _HEIGHTS if autopilot.reading(name).age(now) <= _FRESH)
-        self._source = next(fresh, "")
+        self._source = _source(autopilot, now)
         self._newest = autopilot.reading(self._source)
         self._first = self._lowest = self._newest.value
         self._armed_at = now
@@ -140,3 +146,43 @@ class _Rise:
         else:
             self._higher_since = min(self._higher_since, now)
         self.left_ground = self.left_ground or now - self._higher_since >= _FOR_A_MOMENT
+
+
+class _Stillness:
+    """Whether the vehicle stands: as it says, or as it does not move with its motors off."""
+
+    def __init__(self) -> None:
+        #: Its height where it last said so, m, and by which of _HEIGHTS.
+        self._stood = ("", math.nan)
+        #: Since when it has been here (monotonic s; m, m, m); None: it moves, or is armed.
+        self._here: tuple[float, tuple[float, float, float]] | None = None
+
+    def stands(self, autopilot: AutopilotTracker, now: float) -> bool:
+        """It does, as far as is known now."""
+        source = _source(autopilot, now)
+        height = autopilot.reading(source).value
+        if autopilot.on_ground(now):
+            self._stood = source, height
+            return True
+        if autopilot.armed is not Armed.DISARMED or not source:
+            self._here = None
+            return False
+        north, east = (autopilot.reading(one).value for one in ("latitude", "longitude"))
+        east *= math.cos(math.radians(north))
+        place = (height, north * _DEGREE, east * _DEGREE)
+        if self._here is None or _moved(place, self._here[1]):
+            self._here = (now, place)
+        elsewhere = source == self._stood[0] and abs(height - self._stood[1]) > _ELSEWHERE
+        return now - self._here[0] >= _STILL_FOR and not elsewhere
+
+
+def _source(autopilot: AutopilotTracker, now: float) -> str:
+    """The first of _HEIGHTS that is known now; empty: none is."""
+    fresh = (name for name in _HEIGHTS if autopilot.reading(name).age(now) <= _FRESH)
+    return next(fresh, "")
+
+
+def _moved(place: tuple[float, float, float], before: tuple[float, float, float]) -> bool:
+    """Further than what stands still; what is not known tells nothing."""
+    up, north, east = (new - old for new, old in zip(place, before, strict=True))
+    return abs(up) > _STILL or math.hypot(north, east) > _STILL_OVER_GROUND

@@ -44,17 +44,50 @@ def test_in_air_at_height_0_ends_no_block():
     assert bench.end(-1).finished.success
 
 
+def test_in_air_of_one_that_has_stood_still_ends_no_block():
+    """A quadplane (ArduPlane 4.7.0-dev in its own simulator) was disarmed as a take-off had been
+    ordered, and says IN_AIR from then on; 8 s later it is armed by force, where it stands."""
+    bench = on_the_ground().hear(PILOT, landed(IN_AIR))
+    for k in range(80):
+        bench.at(bench.t + 0.1).hear(PILOT, quadplane(False), landed(IN_AIR))
+        bench.hear(PILOT, at_height(0.2 * (k % 3)))
+    bench.at(bench.t + 0.1).hear(PILOT, quadplane(True), at_height(0.1), landed(IN_AIR))
+    assert disarms(bench) == [0]
+
+
+@pytest.mark.parametrize(
+    ("place", "height"),
+    [
+        # It soars, it falls, it glides; 47.0 degrees and a part of a degree, 111 km.
+        (lambda k: 47.0 + 1e-5 * k, lambda k: 3.0),
+        (lambda k: 47.0, lambda k: 5.0 - 0.08 * k),
+        (lambda k: 47.0 + 1e-5 * k, lambda k: 5.0 - 0.05 * k),
+    ],
+)
+def test_what_says_in_air_and_moves_has_not_stood_still(place, height):
+    bench = on_the_ground().hear(PILOT, landed(IN_AIR))
+    for armed in (False, True):
+        for k in range(40):
+            now = height(k + 40 * armed)
+            at = d.MAVLink_global_position_int_message(
+                0, int(place(k) * 1e7), 85_000_000, int(now * 1000), int(now * 1000), 0, 0, 0, 0
+            )
+            bench.at(bench.t + 0.1).hear(PILOT, quadplane(armed), at, landed(IN_AIR))
+    assert disarms(bench) == []
+
+
 @pytest.mark.parametrize("blocked_first", [True, False])
-def test_one_that_arms_in_the_air_is_not_disarmed(blocked_first):
+@pytest.mark.parametrize("told", [10, 60])
+def test_one_that_arms_in_the_air_is_not_disarmed(blocked_first, told):
     """An autopilot that starts anew at 100 m, a glider that starts its motor: IN_AIR all the
-    time, and disarmed between two heartbeats."""
+    time, and disarmed between two heartbeats, or for longer."""
     bench = Bench().hear(PILOT, quadplane(False), landed(), at_height(0.0))
     climb(bench, quadplane, [10.0 * k for k in range(11)])
     if blocked_first:
         bench.call("flight_block", "the supervisor is lost")
     climb(bench, quadplane, [100.0] * 40)
     for armed in (False, True):
-        for _ in range(10):
+        for _ in range(told):
             bench.at(bench.t + 0.1).hear(PILOT, quadplane(armed), at_height(100.0), landed(IN_AIR))
         bench.call("flight_block", "the supervisor is lost")
     climb(bench, quadplane, [100.0] * 10)
