@@ -53,6 +53,8 @@ def main() -> None:
         _refuse(str(error))
     if unknown := [name for name in chosen.stories if name not in every]:
         _refuse(f"sitl: no story is called {', '.join(unknown)}: see them with --list")
+    if chosen.keep and chosen.keep.is_dir() and any(chosen.keep.iterdir()):
+        _refuse(f"sitl: --keep {chosen.keep} is not empty: name a new folder for these records")
     take_down_when_ended("sitl")
     wrong = 0
     with _apart(), contextlib.ExitStack() as kept:

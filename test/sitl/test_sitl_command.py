@@ -37,6 +37,11 @@ def test_a_wrong_file_and_an_unknown_story_are_refused(tmp_path):
     done = sitl("--stories", "block", "loop", "--", str(binary))
     assert done.returncode == 2
     assert "no story is called loop" in done.stderr
+    done = sitl("--keep", str(tmp_path), str(binary))
+    assert (done.returncode, done.stderr) == (
+        2,
+        f"sitl: --keep {tmp_path} is not empty: name a new folder for these records\n",
+    )
 
 
 def test_it_lists_every_story_with_the_autopilots_that_fly_it():
