@@ -180,21 +180,24 @@ def felt_fall(motion: tuple[Moment, ...]) -> float:
     return 0.0 if told < _TOLD_AS_WELL * felt else felt
 
 
-def speed_error(motion: tuple[Moment, ...], barometer: Rise) -> float:
+def speed_error(motion: tuple[Moment, ...], newest: float, barometer: Rise) -> float:
     """By how much the estimator's vertical speed and the barometer's differ, whichever is the
-    higher, m/s; NaN: not known."""
-    return abs(barometer.rate - _told_meanwhile(motion, barometer))
+    higher, m/s; NaN: not known. newest: the estimator's, where all of that time is in doubt."""
+    told = _told_meanwhile(motion, barometer)
+    return abs(barometer.rate - (newest if math.isnan(told) else told))
 
 
 def force_error(motion: tuple[Moment, ...]) -> float:
     """By how much the force differs from what would hold the vehicle in the attitude of the last
-    second, and speed it up as its estimator tells, m/s^2: near 0 in a turn, in a climb, and as a
-    dive is caught. Of what leans by more than 70 degrees, so much as if it leant by 70. NaN: not
-    known."""
-    known = [one for one in _last(motion, 1.0) if not any(map(math.isnan, one))] if motion else []
+    second, and speed it up as its estimator tells, if it tells, m/s^2: near 0 in a turn, in a
+    climb, and as a dive is caught. Of what leans by more than 70 degrees, so much as if it leant
+    by 70. NaN: not known."""
+    newest = _last(motion, 1.0) if motion else []
+    known = [one for one in newest if not math.isnan(one[2]) and not math.isnan(one[3])]
     if len(known) < _FEW or known[-1] is not motion[-1]:
         return math.nan
     speeds_up = (known[-1][1] - known[0][1]) / (known[-1][0] - known[0][0])
+    speeds_up = 0.0 if math.isnan(speeds_up) else speeds_up
     needed = (GRAVITY + speeds_up) / max(fmean([one[3] for one in known]), _ON_ITS_SIDE)
     return abs(fmean([one[2] for one in known]) - needed)
 

@@ -187,7 +187,8 @@ def _error(config: SupervisorConfig, state: State, name: str, now: float) -> tup
     if name == FORCE_ERROR:
         error = force_error(state.heard.motion)
     else:
-        error = speed_error(state.heard.motion, pressure_change(config, state, now))
+        speed = measured(config, state, VERTICAL_SPEED, now)
+        error = speed_error(state.heard.motion, speed, pressure_change(config, state, now))
     return error, "too little is told at the same time" if math.isnan(error) else ""
 
 

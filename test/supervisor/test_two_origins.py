@@ -113,6 +113,17 @@ def test_a_spin_that_its_estimator_does_not_tell_is_told_by_force_and_barometer(
     assert took <= (3.0 if runs_away >= 0.0 else 4.5)
 
 
+def test_nor_does_a_jump_of_its_speed_hide_a_spin() -> None:
+    """It told the sink, and from one word to the next it hovers: what jumps is in doubt."""
+    teller = up("fixed_wing")
+    for k in range(20):
+        speed = max(-9.5, -0.6 * k)
+        sinks = {"vertical_speed": speed + teller.noise(0.2), "height": HIGH - 0.5 * k}
+        teller.tell(**sinks, tilt=72.0, force=10.0, true_height=HIGH - 0.5 * k)
+    assert not deployed(teller)
+    assert turning(teller, 12.0, 13.0, tilt=72.0) <= 3.0
+
+
 @pytest.mark.parametrize(
     ("sink", "force", "told"),
     [
