@@ -107,7 +107,7 @@ class _Rise:
 
     def observe(self, autopilot: AutopilotTracker, now: float) -> bool:
         """The autopilot may have said something; True: it was just seen to arm."""
-        if self._stillness.stands(autopilot, now):
+        if self._stillness.observe(autopilot, now):
             self._stood_at = now
         before = self._armings.setdefault(autopilot.device, autopilot.arming_count)
         self._armings[autopilot.device] = autopilot.arming_count
@@ -157,8 +157,8 @@ class _Stillness:
         #: Since when it has been here (monotonic s; m, m, m); None: it moves, or is armed.
         self._here: tuple[float, tuple[float, float, float]] | None = None
 
-    def stands(self, autopilot: AutopilotTracker, now: float) -> bool:
-        """It does, as far as is known now."""
+    def observe(self, autopilot: AutopilotTracker, now: float) -> bool:
+        """The autopilot may have said something; True: it stands, as far as is known now."""
         source = _source(autopilot, now)
         height = autopilot.reading(source).value
         if autopilot.on_ground(now):
