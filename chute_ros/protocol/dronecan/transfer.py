@@ -16,7 +16,8 @@ from chute_ros.errors import MessageError
 from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
 from chute_ros.protocol.dronecan.data_types import DataTypes
 
-_START, _END, _TOGGLE = 0x80, 0x40, 0x20
+#: Bits of the last byte of a frame, beside the transfer id.
+START, END, TOGGLE = 0x80, 0x40, 0x20
 TRANSFER_IDS = 32
 _FRAME_PAYLOAD = 7
 #: A transfer whose next frame does not come within this time (s) is given up; after it, the same
@@ -75,10 +76,10 @@ def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list
     for start in range(0, max(len(payload), 1), _FRAME_PAYLOAD):
         chunk = payload[start : start + _FRAME_PAYLOAD]
         tail = transfer.transfer_id % TRANSFER_IDS | toggle
-        tail |= _START if start == 0 else 0
-        tail |= _END if start + _FRAME_PAYLOAD >= len(payload) else 0
+        tail |= START if start == 0 else 0
+        tail |= END if start + _FRAME_PAYLOAD >= len(payload) else 0
         frames.append(CanFrame(identifier, chunk + bytes((tail,))))
-        toggle ^= _TOGGLE
+        toggle ^= TOGGLE
     return frames
 
 
@@ -169,7 +170,7 @@ class Assembler:
         if self._types.by_id(head.type_id, head.kind.value) is None:
             return self._drop("transfers of unknown types")
         if head.source == 0:
-            if frame.data[-1] & (_START | _END | _TOGGLE) != _START | _END:
+            if frame.data[-1] & (START | END | TOGGLE) != START | END:
                 return self._drop("anonymous transfers of more than one frame")
             return replace(head, payload=frame.data[:-1])
         return self._next(head, frame, now)
@@ -194,24 +195,24 @@ class Assembler:
             self._sessions.popitem(last=False)
         tail, chunk = frame.data[-1], frame.data[:-1]
         same = session.transfer_id == head.transfer_id and now - session.heard < TRANSFER_TIMEOUT
-        if tail & _START:
+        if tail & START:
             if session.came_before(head.transfer_id, now):
                 # A device that has just started counts from 0 again; what it says then differs.
                 newest = session.done[-1][0] == head.transfer_id
-                anew = newest and tail & _END and session.said not in (b"", chunk)
+                anew = newest and tail & END and session.said not in (b"", chunk)
                 if not anew:
                     return self._drop("duplicate transfers")
             tells_a_state = head.kind is Kind.MESSAGE and head.type_id != _NODE_STATUS
             if tells_a_state and session.is_old_news(head.transfer_id, now):
                 return self._drop("messages that a newer one has overtaken")
-            if tail & _TOGGLE:
+            if tail & TOGGLE:
                 return self._drop("toggle bit wrong")
-            if not tail & _END and len(chunk) < _FRAME_PAYLOAD:
+            if not tail & END and len(chunk) < _FRAME_PAYLOAD:
                 return self._drop("first frame too short")
             if session.payload is not None and not same:
                 self._drop("transfers cut short")
-            session.transfer_id, session.heard, session.toggle = head.transfer_id, now, _TOGGLE
-            if tail & _END:
+            session.transfer_id, session.heard, session.toggle = head.transfer_id, now, TOGGLE
+            if tail & END:
                 session.payload = None
                 session.done.append((head.transfer_id, now))
                 session.said = chunk
@@ -221,16 +222,16 @@ class Assembler:
             return None
         if session.payload is None or not same:
             return self._drop("frames without their beginning")
-        if tail & _TOGGLE != session.toggle:
+        if tail & TOGGLE != session.toggle:
             # A frame that came twice, or one was lost: the CRC decides in the end.
             return self._drop("toggle bit wrong")
-        session.toggle ^= _TOGGLE
+        session.toggle ^= TOGGLE
         session.heard = now
         session.payload += chunk
         if len(session.payload) > MOST_PAYLOAD:
             session.payload = None
             return self._drop("transfers that are too long")
-        if not tail & _END:
+        if not tail & END:
             return None
         payload, session.payload = bytes(session.payload), None
         data_type = self._types.by_id(head.type_id, head.kind.value)

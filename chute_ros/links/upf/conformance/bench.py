@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,6 +79,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self._home, self._ids = 0, {0}
         self._endpoint = Endpoint(definitions.types, vehicle)
         self._numbers: dict[tuple[int, str], int] = {}
+        #: Frames of ours, some of them spoilt, that leave before others.
+        self._spoilt: list[bytes] = []
         self._beat_at = self._tell_at = -math.inf
 
     # -- as the session wants it ----------------------------------------------------------------
@@ -121,7 +123,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
         return min(self._beat_at, self._tell_at)
 
     def take_output(self) -> list[bytes]:
-        return self._endpoint.take_output()
+        spoilt, self._spoilt = self._spoilt, []
+        return [*spoilt, *self._endpoint.take_output()]
 
     def _answer(self, request: Heard) -> None:
         """As a vehicle that obeys."""
@@ -147,8 +150,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         server = self.node if node is None else node
         self._check(service, values)
         for _ in range(tries):
-            number = self._numbers.get((server, service), 0)
-            self._numbers[server, service] = (number + 1) % TRANSFER_IDS
+            number = self._next_number(server, service)
             text = ", ".join(f"{key}={value}" for key, value in values.items())
             self.noted(True, "us", f"{service} request to node {server}", text, b"")
             self._endpoint.request(server, service, number, values, 16)
@@ -156,6 +158,30 @@ class UpfBench(RecordingBench[HeardTransfer]):
             if answer is not None:
                 return answer
         return None
+
+    def _next_number(self, server: int, service: str) -> int:
+        """The transfer id of a request."""
+        number = self._numbers.get((server, service), 0)
+        self._numbers[server, service] = (number + 1) % TRANSFER_IDS
+        return number
+
+    def send_spoilt(
+        self,
+        name: str,
+        value: p.Value,
+        before: p.Value,
+        spoils: Callable[[list[bytes]], list[bytes]],
+    ) -> None:
+        """Set a parameter, which is this before, by a request whose frames are spoilt so (sixteen
+        bytes each: can_frame)."""
+        values = {"index": 0, "value": p.union_of(value), "name": name.encode()}
+        self._check(bus_requests.GET_SET, values)
+        self.changed.setdefault(name, before)
+        self.noted(True, "us", f"spoilt {bus_requests.GET_SET}", f"{name} {value}", b"")
+        whole = self._endpoint.take_output()
+        number = self._next_number(self.node, bus_requests.GET_SET)
+        self._endpoint.request(self.node, bus_requests.GET_SET, number, values, 16)
+        self._spoilt += [*whole, *spoils(self._endpoint.take_output())]
 
     def _response(self, server: int, service: str, number: int) -> Any:
         since = len(self.every)

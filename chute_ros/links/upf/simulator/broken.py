@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from chute_ros.links.upf.protocol import bus_requests
@@ -15,8 +16,10 @@ from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.spoilt import SpoiltRequests
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.endpoint import Heard
 
 _S = ParachuteState
@@ -24,8 +27,8 @@ _S = ParachuteState
 _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
 #: It takes off by itself after so long, s; and tells no state for so long at first.
 _TAKES_OFF_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
-#: It is silent for so long after it was first told the time, s.
-_STANDS_STILL = 6.4
+#: It is silent for so long after it was first told the time, and after spoilt frames, s.
+_STANDS_STILL, _STUNNED = 6.4, 2.3
 #: Request -> the clause that it breaks by its answer, though it does as it is told.
 _ANSWERS = {
     "TYPE_TAKEOFF": "takeoff",
@@ -51,6 +54,7 @@ class BrokenController(UpfController):
         super().__init__(definitions, settings)
         self._first_start = self._ready_since = math.nan
         self._dumb_until = -math.inf
+        self._spoilt = SpoiltRequests(definitions.types)
         if change := _CHANGES.get(breaks):
             change(self)
 
@@ -68,11 +72,31 @@ class BrokenController(UpfController):
 
     def receive(self, data: bytes, now: float) -> None:
         asked, synced = not self.node_id, self.clock.master
+        if self.breaks == "other-node":
+            data = self._as_its_own(data)
         super().receive(data, now)
+        if self.breaks and self._spoilt.observe(data) == self.breaks:
+            self._is_wrong_about_it(now)
         if self.breaks == "time-sync" and self.clock.master and not synced:
             self._dumb_until = now + _STANDS_STILL
         if self.breaks == "dna" and asked and self.node_id:
             self.endpoint.node_id -= 1
+
+    def _is_wrong_about_it(self, now: float) -> None:
+        """It carries out what has a wrong CRC; all else makes it silent for a while."""
+        if self.breaks == "wrong-crc":
+            for frame in self._spoilt.mended():
+                super().receive(frame, now)
+        else:
+            self._dumb_until = now + _STUNNED
+
+    def _as_its_own(self, data: bytes) -> bytes:
+        """A request to another node, as if it were for this one."""
+        frame = unpack(data)
+        if frame is None or not frame.extended or frame.identifier & 0x8080 != 0x8080:
+            return data
+        identifier = frame.identifier & ~0x7F00 | self.node_id << 8
+        return pack(replace(frame, identifier=identifier))
 
     def take_output(self) -> list[bytes]:
         frames, up = super().take_output(), self.now - self._first_start
@@ -272,5 +296,6 @@ BREAKS = (
     *(f"exclude-{name}" for name in _ANSWERS.values()),
     *("state-known", "soak", "unknown-type", "no-auto-takeoff", "arm-order"),
     *("disabled", "deploy", "touchdown", "dna", "dna-forgets"),
-    *("time-sync", "trigger-node-id"),
+    *("time-sync", "trigger-node-id", "lost-frame", "reordered-frames", "doubled-frames"),
+    *("cut-transfer", "wrong-crc", "foreign-frames", "other-node"),
 )
