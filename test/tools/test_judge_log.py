@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -143,7 +144,7 @@ def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
         ("notes.txt", b"the flight went well\n", "no log of a known format (ArduPilot's .bin"),
         ("noise.tlog", bytes(range(256)) * 20, "no log of a known format"),
         ("table.csv", b"a,b\n1,2\n", "no column for time and height; its first line has a, b"),
-        ("table.csv", b"time,height\n1,x\n", "no flight: it has 0 rows with a time and a height"),
+        ("table.csv", b"time,height\n1,x\n", "no flight: of 1 rows 0 have a number for time "),
         ("table.csv", b"time," + b"a" * 200_000 + b"\n1,2\n", "no table: field larger than"),
         (
             "table.csv",
@@ -254,6 +255,17 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
     assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
     tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")
     assert tilt.blind > 0.9
+
+
+def test_a_rule_that_waits_for_nothing_is_told_without_a_counter(fallen, tmp_path, capsys):
+    """`parachute open` has no `for`: its counter has no highest, which was told as nan s."""
+    one = judged(FORMATS["flight.tlog"](fallen, tmp_path / "flight.tlog"))
+    told = {rating.told.name: rating.told for rating in ratings(one)}
+    first = told[one.fired[0][1].rule]
+    assert command._came(replace(first, hold=0.0)) == (
+        f"{first.name} fulfilled, {first.fulfilled_at:.1f} s"
+    )
+    assert command._came(first).startswith(f"{first.name} {first.peak:.2f} of {first.hold:g} s, ")
 
 
 @pytest.fixture(scope="module")

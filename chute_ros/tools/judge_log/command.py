@@ -26,6 +26,7 @@ from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording_options import complain, write
+from chute_ros.tools.state_rows import RuleTold
 
 CLEAN, FIRED, UNREADABLE = 0, 1, 2
 #: What carries one parachute on MAVLink.
@@ -146,6 +147,13 @@ def flown(log: FlightLog, config: SupervisorConfig) -> Judged:
     return fly(log, config, log.duration, lambda at: progress.at(max(0, round(at))))
 
 
+def _came(rule: RuleTold) -> str:
+    """How near, and when; a rule that waits for nothing has no counter."""
+    if not rule.hold:
+        return f"{rule.name} fulfilled, {rule.fulfilled_at:.1f} s"
+    return f"{rule.name} {rule.peak:.2f} of {rule.hold:g} s, {rule.peak_at:.1f} s"
+
+
 def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
     log = one.log
     lines = [
@@ -154,10 +162,7 @@ def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
         f"  {verdict.words}",
     ]
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
-    lines += [
-        f"  nearest: {r.told.name} {r.told.peak:.2f} of {r.told.hold:g} s, {r.told.peak_at:.1f} s"
-        for r in verdict.moved[:3]
-    ]
+    lines += [f"  nearest: {_came(one.told)}" for one in verdict.moved[:3]]
     lines += [
         f"  not known: {u.name} for {100.0 * u.share:.0f} % of the flight ({u.why})"
         for u in verdict.unknown

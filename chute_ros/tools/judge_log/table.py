@@ -92,12 +92,15 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
         else:
             bad += 1
     values.sort(key=lambda one: one["time"])
-    if len(values) < 2:
-        raise LogError(f"{path}: no flight: it has {len(values)} rows with a time and a height")
-    _check_times(path, [one["time"] for one in values], rows[begin - 1][places["time"][0]])
-    remarks = [f"{bad} rows without a time or a height were left out"] if bad else []
     headings = rows[begin - 1]
     used = ", ".join(f"{name} from {headings[at].strip()!r}" for name, (at, _) in places.items())
+    if len(values) < 2:
+        raise LogError(
+            f"{path}: no flight: of {len(rows) - begin} rows {len(values)} have a number for time "
+            f"and height ({used}): name others by --column"
+        )
+    _check_times(path, [one["time"] for one in values], headings[places["time"][0]])
+    remarks = [f"{bad} rows without a time or a height were left out"] if bad else []
     messages = _told(values, remarks)
     return FlightLog(
         path,

@@ -26,6 +26,8 @@ FORMAT = "PX4 ULog"
 MAGIC = b"ULog\x01\x12\x35"
 
 _US = 1e-6
+#: What is lost in less is nothing, s.
+_GAP = 0.05
 #: vehicle_status.arming_state.
 _ARMED = 2
 _TOPICS = [
@@ -60,7 +62,7 @@ def read(path: Path) -> FlightLog:
     if ulog.file_corruption or noise.getvalue():
         log.remarks.append("it is damaged: what could be read is judged")
     lost = sum(one.duration for one in ulog.dropouts) / 1000.0
-    if lost:
+    if lost >= _GAP:
         log.remarks.append(f"the log has gaps of {lost:.1f} s in all")
     return log
 
