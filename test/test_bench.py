@@ -18,7 +18,12 @@ KILL_SWITCH, DECODING, TELEMETRY = (
 )
 FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
 FEW += ("--rounds", "2", "--deploys", "2", "--cost-seconds", "1", "--message-batches", "3")
+FEW += ("--executor-requests", "2", "--onlooker-requests", "2")
+#: The sections of docs/evidence/bench.md, and those that have pages of their own.
+KEPT = ("Kill switch", "A vehicle", "Decoding", "Decoding a line", "Through the node")
+ELSEWHERE = ("Executors", "Onlookers")
 PEERS = ("chute_ros", "ROS alone", "bare relay")
+EXECUTORS = ["NodeExecutor", "SingleThreadedExecutor"]
 HOW = ("idle", "under 10 times the frames")
 HOPS = tuple(
     f"{hop}, {how}"
@@ -140,17 +145,17 @@ def check_telemetry(text):
     return int(re.search(r"at 13 lines/s (\d+) lines to each\.$", text, re.M)[1])
 
 
-def sections(text):
-    """The whole file is of the form that the command writes: its five sections."""
-    names = "Kill switch|A vehicle|Decoding|Decoding a line|Through the node"
-    head, *found = re.split(rf"^##+ (?:{names})$", text, flags=re.M)
-    assert len(found) == 5
+def sections(text, names=KEPT):
+    """The whole file is of the form that the command writes: these sections, in any order."""
+    head, *found = re.split(rf"^##+ ({'|'.join(names)})$", text, flags=re.M)
+    by_name = dict(zip(found[::2], found[1::2], strict=True))
+    assert set(by_name) == set(names)
     assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+ of /\S+; ROS 2 \w+\.$", head, re.M)
-    assert found[2].rstrip().endswith("## Umbilical telemetry")
+    assert by_name["Decoding"].rstrip().endswith("## Umbilical telemetry")
     assert text.count("## Umbilical telemetry") == 1
-    for section in found:
+    for section in by_name.values():
         assert re.match(r"\n\nLoad before the run: \d+\.\d ", section)
-    return [section.replace("## Umbilical telemetry\n", "") for section in found]
+    return [by_name[name].replace("## Umbilical telemetry\n", "") for name in names]
 
 
 def bench(module, *arguments):
@@ -170,7 +175,10 @@ def bench(module, *arguments):
 def test_all_parts_are_measured_in_one_run(tmp_path):
     output = tmp_path / "bench.md"
     done = bench("bench", *FEW, "--output", str(output))
-    kill_switch, vehicle, messages, decoding, telemetry = sections(output.read_text())
+    found = sections(output.read_text(), (*KEPT, *ELSEWHERE))
+    kill_switch, vehicle, messages, decoding, telemetry, executors, onlookers = found
+    assert re.findall(r"^\| (\w+Executor) \| \d", executors, re.M) == EXECUTORS
+    assert len(re.findall(r"^\| (?:kill|answer), .+ ms \|", onlookers, re.M)) == 2 * 2 * 3
     assert check_kill_switch(kill_switch) == 5
     assert check_vehicle(vehicle) == (2, 2)
     assert check_messages(messages) == 3
