@@ -306,7 +306,7 @@ def _carried(motion: tuple[Moment, ...]) -> list[Moment]:
     carried in full; empty: it does not."""
     newest = _last(motion, _CARRIED_FOR) if motion else []
     known = [one for one in newest if not any(map(math.isnan, one))]
-    if len(known) < 4 or known[-1] is not motion[-1]:
+    if len(known) < _FEW or known[-1] is not motion[-1]:
         return []
     forces, (least, most) = [one[2] for one in known], _CARRIED
     in_full = all(abs(force - GRAVITY) <= _SHAKES for force in forces)

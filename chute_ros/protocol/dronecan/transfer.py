@@ -108,6 +108,20 @@ def _identifier(transfer: Transfer, discriminator: int) -> int:
     return common_part | transfer.type_id << 8
 
 
+def head_of(frame: CanFrame) -> Transfer:
+    """All of a transfer that a frame of it says with its identifier and its tail byte, with an
+    empty payload."""
+    identifier = frame.identifier
+    priority, source = identifier >> 24 & 0x1F, identifier & 0x7F
+    transfer_id = frame.data[-1] % TRANSFER_IDS
+    if identifier & 0x80:
+        kind = Kind.REQUEST if identifier & 0x8000 else Kind.RESPONSE
+        type_id, destination = identifier >> 16 & 0xFF, identifier >> 8 & 0x7F
+        return Transfer(kind, type_id, source, destination, transfer_id, b"", priority)
+    type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
+    return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, b"", priority)
+
+
 @dataclass
 class _Session:
     """One sender's transfers of one type to one destination."""
@@ -162,7 +176,7 @@ class Assembler:
             return self._drop("frames that are not of DroneCAN")
         if not frame.data:
             return self._drop("frames without a tail byte")
-        head = self._head(frame)
+        head = head_of(frame)
         if head.destination not in (0, node_id):
             return None
         if head.kind is not Kind.MESSAGE and 0 in (head.source, head.destination):
@@ -174,18 +188,6 @@ class Assembler:
                 return self._drop("anonymous transfers of more than one frame")
             return replace(head, payload=frame.data[:-1])
         return self._next(head, frame, now)
-
-    def _head(self, frame: CanFrame) -> Transfer:
-        """All of a transfer that its identifier says, with an empty payload."""
-        identifier = frame.identifier
-        priority, source = identifier >> 24 & 0x1F, identifier & 0x7F
-        transfer_id = frame.data[-1] % TRANSFER_IDS
-        if identifier & 0x80:
-            kind = Kind.REQUEST if identifier & 0x8000 else Kind.RESPONSE
-            type_id, destination = identifier >> 16 & 0xFF, identifier >> 8 & 0x7F
-            return Transfer(kind, type_id, source, destination, transfer_id, b"", priority)
-        type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
-        return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, b"", priority)
 
     def _next(self, head: Transfer, frame: CanFrame, now: float) -> Transfer | None:
         key = (head.kind, head.type_id, head.source, head.destination)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from chute_ros.conformance.clause import Trial, failed, not_tried
@@ -11,8 +12,9 @@ from chute_ros.links.upf.conformance.standard import UpfClause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.dronecan.transfer import END, HIGHEST_NODE_ID, START, Kind
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind, frames_of, head_of
 
+_DOCUMENT, _SECTION = "DroneCAN specification", "CAN bus transport layer"
 #: What is set by frames that are spoilt, ms: other than as delivered.
 _SPOILT = 650
 #: Numbers of standard messages (below 20000) that stand for none.
@@ -51,10 +53,10 @@ def _damaged(frames: list[bytes]) -> list[bytes]:
 
 def _foreign(frames: list[bytes]) -> list[bytes]:
     """Of types that nobody has, of another protocol, and without a tail byte, in their place."""
-    identifier = _first(frames).identifier
-    sender, whole = identifier & 0x7F, bytes((1, 2, 3, START | END))
-    messages = [CanFrame(16 << 24 | one << 8 | sender, whole) for one in _NOBODYS_TYPES]
-    others = [CanFrame(0x123, bytes(8), extended=False), CanFrame(identifier, b"")]
+    first = _first(frames)
+    message = replace(head_of(first), kind=Kind.MESSAGE, destination=0, payload=bytes(3))
+    messages = [frames_of(replace(message, type_id=one), 0)[0] for one in _NOBODYS_TYPES]
+    others = [CanFrame(0x123, bytes(8), extended=False), CanFrame(first.identifier, b"")]
     return [pack(one) for one in (*messages, *others)]
 
 
@@ -101,7 +103,6 @@ def _clause(
     return UpfClause(_DOCUMENT, _SECTION, name, text, trial, _DOES)
 
 
-_DOCUMENT, _SECTION = "DroneCAN specification", "CAN bus transport layer"
 CLAUSES: tuple[UpfClause, ...] = (
     _clause(
         "lost-frame",

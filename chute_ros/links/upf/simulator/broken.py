@@ -21,6 +21,7 @@ from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.endpoint import Heard
+from chute_ros.protocol.dronecan.transfer import Kind, head_of
 
 _S = ParachuteState
 #: It falls silent so long after its first start, for so long, s.
@@ -86,14 +87,16 @@ class BrokenController(UpfController):
         """It carries out what has a wrong CRC; all else makes it silent for a while."""
         if self.breaks == "wrong-crc":
             for frame in self._spoilt.mended():
-                super().receive(frame, now)
+                super().receive(pack(frame), now)
         else:
             self._dumb_until = now + _STUNNED
 
     def _as_its_own(self, data: bytes) -> bytes:
         """A request to another node, as if it were for this one."""
         frame = unpack(data)
-        if frame is None or not frame.extended or frame.identifier & 0x8080 != 0x8080:
+        if frame is None or not frame.extended or not frame.data:
+            return data
+        if head_of(frame).kind is not Kind.REQUEST:
             return data
         identifier = frame.identifier & ~0x7F00 | self.node_id << 8
         return pack(replace(frame, identifier=identifier))

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
-from dronecan.dsdl import common
-
-from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
+from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.transfer import END, START, TOGGLE, Kind
-
-#: Bits of an identifier: a service, and its request.
-_SERVICE, _REQUEST = 0x80, 0x8000
+from chute_ros.protocol.dronecan.transfer import END, START, TOGGLE, Kind, frames_of, head_of
 
 
 class SpoiltRequests:
@@ -28,23 +24,19 @@ class SpoiltRequests:
         frame = unpack(data)
         if frame is None or not frame.extended or not frame.data:
             return "foreign-frames"
-        if not frame.identifier & _SERVICE:
-            number = frame.identifier >> 8 & 0xFFFF
-            known = self._types.by_id(number, Kind.MESSAGE.value)
+        head = head_of(frame)
+        if head.kind is Kind.MESSAGE:
+            known = self._types.by_id(head.type_id, head.kind.value)
             return "" if known else "foreign-frames"
-        if not frame.identifier & _REQUEST:
-            return ""
-        return self._follow(frame, frame.data[-1])
+        return self._follow(frame, frame.data[-1]) if head.kind is Kind.REQUEST else ""
 
-    def mended(self) -> list[bytes]:
+    def mended(self) -> list[CanFrame]:
         """The frames of the last request of several, with the right CRC."""
-        first, *others = self._ended
-        data_type = self._types.by_id(first.identifier >> 16 & 0xFF, Kind.REQUEST.value)
+        head = head_of(self._ended[0])
+        data_type = self._types.by_id(head.type_id, head.kind.value)
         assert data_type is not None  # the kit asks for what the controller has
         payload = b"".join(one.data[:-1] for one in self._ended)[2:]
-        crc = common.crc16_from_bytes(payload, initial=data_type.base_crc)
-        right = CanFrame(first.identifier, bytes((crc & 0xFF, crc >> 8)) + first.data[2:])
-        return [pack(one) for one in (right, *others)]
+        return frames_of(replace(head, payload=payload), data_type.base_crc)
 
     def _follow(self, frame: CanFrame, tail: int) -> str:
         if tail & START and self._frames != [frame]:
@@ -62,4 +54,4 @@ class SpoiltRequests:
         toggles = [one.data[-1] & TOGGLE for one in self._ended]
         if stuck := sum(one == other for one, other in pairwise(toggles)):
             return "lost-frame" if stuck == 1 else "reordered-frames"
-        return "" if self.mended()[0] == pack(self._ended[0]) else "wrong-crc"
+        return "" if self.mended() == self._ended else "wrong-crc"
