@@ -21,7 +21,7 @@ def check_armed(turn: Turn) -> None:
     if turn.now < state.stage_since + ARMED_SHOWS:
         return
     if state.stage is Stage.READY:
-        _show_armed(turn)
+        _show_armed(turn, state.armed(turn.config))
     elif state.stage is Stage.ARMED and not state.armed(turn.config):
         told = [
             status
@@ -35,8 +35,8 @@ def check_armed(turn: Turn) -> None:
             turn.move(Event.DISARMED, text)
 
 
-def _show_armed(turn: Turn) -> None:
-    if armed := turn.state.armed(turn.config):
+def _show_armed(turn: Turn, armed: list[tuple[str, str]]) -> None:
+    if armed:
         turn.move(Event.ARMED, f"{', '.join(map(' '.join, armed))} says armed")
 
 
@@ -53,10 +53,16 @@ def check_links(turn: Turn) -> None:
     if listed(stage, event):
         turn.move(event, "; ".join(reasons))
         if not reasons:
-            # What was armed before a link was silent is armed still.
-            _show_armed(turn)
+            # What was armed before a link was silent is armed still, until its status says
+            # otherwise: the heartbeat that makes the link whole may overtake it.
+            last_said = turn.state.armed(turn.config) + turn.state.armed(turn.config, False)
+            _show_armed(turn, [one for one in last_said if _heard(turn, one[0])])
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")
+
+
+def _heard(turn: Turn, link: str) -> bool:
+    return turn.state.evidence(link).is_heard(turn.config.limits(link), turn.now)
 
 
 def block_or_release(turn: Turn) -> None:

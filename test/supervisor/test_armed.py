@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from story import LINK, STANDING, START, Story, parachute
 
+from chute_ros.model import LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
@@ -114,6 +115,32 @@ def test_when_a_link_is_whole_again_it_is_armed_again_if_it_still_says_so(
     keeps_saying(story, 5.0, says(told))
     assert story.state.stage is Stage.BLOCKED, "heard again, not for long enough"
     keeps_saying(story, 6.0, says(told))
+    assert story.state.stage is stage
+
+
+def test_a_heartbeat_that_overtakes_its_status_hides_no_armed_parachute() -> None:
+    """The two come on two topics, whose order nobody promises."""
+    story = armed()
+    keeps_saying(story, 3.0, says(True))
+    silent = story.heartbeat(healthy=False, state=LinkState.STALE)
+    story.at(3.1, silent, says(True, alive=False), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.BLOCKED
+    story.at(3.2, story.heartbeat())
+    assert story.state.stage is Stage.ARMED
+    story.at(3.3, says(True), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.ARMED
+
+
+@pytest.mark.parametrize(("told", "stage"), [(False, Stage.READY), (None, Stage.ARMED)])
+def test_what_it_was_before_the_silence_holds_until_it_says_otherwise(
+    told: bool | None, stage: Stage
+) -> None:
+    story = armed()
+    keeps_saying(story, 3.0, says(True))
+    silent = story.heartbeat(healthy=False, state=LinkState.STALE)
+    story.at(3.1, silent, says(True, alive=False), i.VehicleReport(STANDING))
+    story.at(3.2, story.heartbeat())
+    keeps_saying(story, 6.0, *(() if told is None else (says(told),)))
     assert story.state.stage is stage
 
 
