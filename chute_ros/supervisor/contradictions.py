@@ -164,20 +164,38 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
     return f"the barometer tells {barometer.rate:+.1f} m/s where it tells {told:+.1f}"
 
 
-def felt_fall(motion: tuple[Moment, ...]) -> float:
+def felt_drop(motion: tuple[Moment, ...]) -> float:
     """The vertical speed that a fall has given it lately, as its accelerometer felt it, m/s: 0, or
-    negative. Whichever way up it is: no attitude is asked. A fall that its estimator told as well
-    is none that it hides: what became of it since, it tells, too."""
+    negative; NaN: some of that time nothing was told of. Whichever way up it is: no attitude is
+    asked."""
+    if any(after[0] - before[0] > _GAP for before, after in pairwise(motion)):
+        return math.nan
+    return _felt(motion)
+
+
+def _felt(motion: tuple[Moment, ...]) -> float:
+    return sum((after[2] - GRAVITY) * passed for _, after, passed in _drops(motion))
+
+
+def felt_fall(motion: tuple[Moment, ...]) -> float:
+    """The same of a fall that its estimator hides: one that it told as well is none, as what became
+    of it since, it tells, too. An accelerometer that is stuck feels none."""
     fell = [one[2] for one in motion if one[2] < FREE_FALL]
     if len(fell) < 3 or max(fell) - min(fell) < _FORCE_LIVES:
         return 0.0
-    felt = told = 0.0
+    felt = _felt(motion)
+    changes = [after[1] - before[1] for before, after, _ in _drops(motion)]
+    told = sum(change for change in changes if not math.isnan(change))
+    return 0.0 if told < _TOLD_AS_WELL * felt else felt
+
+
+def _drops(motion: tuple[Moment, ...]) -> Iterator[tuple[Moment, Moment, float]]:
+    """Two moments and the time between them, s, over which less than half of its weight carried
+    it."""
     for before, after in pairwise(motion):
         passed = after[0] - before[0]
         if after[2] < FREE_FALL and passed <= _GAP:
-            felt += (after[2] - GRAVITY) * passed
-            told += 0.0 if math.isnan(after[1] - before[1]) else after[1] - before[1]
-    return 0.0 if told < _TOLD_AS_WELL * felt else felt
+            yield before, after, passed
 
 
 def speed_error(motion: tuple[Moment, ...], newest: float, barometer: Rise) -> float:

@@ -64,13 +64,14 @@ PRESSURE_ALTITUDE, ACCELERATION, TILT = "pressure_altitude", "acceleration", "ti
 #: the vertical speeds of the last second, m/s^2, and from the accelerations of the last three
 #: seconds, m/s. On these conditions can rest as on the measurements that tell them.
 CLIMB_RATE, VERTICAL_ACCELERATION = "climb_rate", "vertical_acceleration"
-FELT_FALL = "felt_fall"
+FELT_DROP, FELT_FALL = "felt_drop", "felt_fall"
 #: What others tell besides an estimator, over the last second: by how much a barometer's rate
 #: differs from its vertical speed, m/s, and the force from what it needs, m/s^2.
 SPEED_ERROR, FORCE_ERROR = "speed_error", "force_error"
 DERIVED: dict[str, tuple[str, ...]] = {
     CLIMB_RATE: (HEIGHT, PRESSURE_ALTITUDE),
     VERTICAL_ACCELERATION: (VERTICAL_SPEED,),
+    FELT_DROP: (ACCELERATION,),
     FELT_FALL: (ACCELERATION,),
     SPEED_ERROR: (PRESSURE_ALTITUDE, VERTICAL_SPEED),
     FORCE_ERROR: (ACCELERATION, VERTICAL_SPEED, TILT),

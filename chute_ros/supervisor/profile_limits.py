@@ -17,6 +17,7 @@ from chute_ros.supervisor.conditions.measurement import (
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
+    FELT_DROP,
     FELT_FALL,
     FORCE_ERROR,
     HEIGHT,
@@ -54,6 +55,7 @@ _HOVERS = {
     VERTICAL_SPEED: 0.0,
     CLIMB_RATE: 0.0,
     VERTICAL_ACCELERATION: 0.0,
+    FELT_DROP: 0.0,
     FELT_FALL: 0.0,
     SPEED_ERROR: 0.0,
     FORCE_ERROR: 0.0,

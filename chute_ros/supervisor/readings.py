@@ -13,6 +13,7 @@ from chute_ros.supervisor.contradictions import (
     NOT_TOLD,
     Drop,
     Rise,
+    felt_drop,
     felt_fall,
     force_error,
     speed_error,
@@ -21,6 +22,7 @@ from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
     DERIVED,
+    FELT_DROP,
     FELT_FALL,
     FORCE_ERROR,
     HEIGHT,
@@ -40,6 +42,8 @@ _CLIMB_OVER = 0.4
 PARTS = {"tilt_deg": "attitude"}
 #: What a barometer told longer ago says nothing of a fall, s.
 _DROP_WITHIN = 12.0
+#: What an accelerometer tells of the last seconds.
+_FELT = {FELT_DROP: felt_drop, FELT_FALL: felt_fall}
 #: What sets an estimator against others.
 _ERRORS = (SPEED_ERROR, FORCE_ERROR)
 _HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
@@ -54,9 +58,10 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
         return math.nan, _HEIGHT_LOST
     if name == VERTICAL_ACCELERATION:
         return _vertical_acceleration(config, state, now)
-    if name == FELT_FALL:
+    if name in _FELT:
         why = unusable(config, state, ACCELERATION, now)
-        return (math.nan, why) if why else (felt_fall(state.heard.motion), "")
+        felt = math.nan if why else _FELT[name](state.heard.motion)
+        return felt, why or ("too little was told lately" if math.isnan(felt) else "")
     if name in _ERRORS:
         return _error(config, state, name, now)
     known = state.measured(name)
@@ -145,7 +150,7 @@ def samples(config: SupervisorConfig, state: State, name: str, value: float, now
     """How many have come so far of what tells a measurement that can be used. value: what was read
     of it, which may be what the heights tell in its place."""
     speed = state.measured(VERTICAL_SPEED)
-    if name in (FELT_FALL, *_ERRORS):
+    if name in (*_FELT, *_ERRORS):
         told = DERIVED[name][0]
     elif name == VERTICAL_ACCELERATION and not speed.unusable(
         config.profile.limits[VERTICAL_SPEED], now

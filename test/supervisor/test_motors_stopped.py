@@ -9,6 +9,7 @@ from story import DOWN, Story, falling, pressure_at, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.contradictions import GRAVITY
 
 D = Action.DEPLOY
 
@@ -136,6 +137,19 @@ def test_a_fall_that_drag_soon_carries_is_seen_as_well(told_since: float) -> Non
             story.at(2.0 + 0.1 * k, story.heartbeat())
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(D) - 2.0 < (1.2 if told_since == 0.0 else 3.0)
+
+
+def test_one_that_descends_fast_and_whose_heartbeat_is_wrong_is_not() -> None:
+    """What still turns carries: of motors that stop, force is missing at once."""
+    story, height = Story(shipped("multirotor")).ready().fly(2.0, height=120.0), 120.0
+    for k in range(1, 90):
+        speed = min(0.2 * k, 10.0)
+        height -= 0.1 * speed
+        parts = {"height": height, "vertical_speed": -speed}
+        force = GRAVITY if speed == 10.0 else GRAVITY - 2.0
+        said = {"armed": Armed.DISARMED} if k > 60 else {}
+        story.at(2.0 + 0.1 * k, story.heartbeat(), story.told(**parts, acceleration=force, **said))
+    assert story.fired() == []
 
 
 def test_landed_on_a_roof_and_disarmed_it_is_not() -> None:

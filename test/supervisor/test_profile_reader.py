@@ -534,6 +534,7 @@ MEASUREMENTS = (
     *STANDARD_LIMITS,
     "climb_rate",
     "vertical_acceleration",
+    "felt_drop",
     "felt_fall",
     "speed_error",
     "force_error",

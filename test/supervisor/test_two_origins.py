@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from story import DOWN
 from test_one_estimator import AIRCRAFT, EVERY, Teller, deployed, told_to
 
-from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, felt_fall, height_denied
+from chute_ros.supervisor.contradictions import (
+    FREE_FALL,
+    GRAVITY,
+    felt_drop,
+    felt_fall,
+    height_denied,
+)
 
 HIGH = 150.0
 
@@ -195,6 +201,16 @@ def test_a_fall_that_the_estimator_tells_is_none_that_it_hides(told: float, felt
     assert felt_fall(fell) == pytest.approx(felt, abs=0.1)
     caught = tuple((1.1 + 0.1 * k, told * (10 - k), 2.0 * GRAVITY, 1.0) for k in range(10))
     assert felt_fall((*fell, *caught)) == pytest.approx(felt, abs=0.1)
+
+
+def test_a_drop_is_felt_whether_it_was_told_as_well_or_not() -> None:
+    for told in (0.0, -0.98):
+        fell = tuple((t, told * k, f, c) for k, (t, _, f, c) in enumerate(MOMENTS))
+        assert felt_drop(fell) == pytest.approx(-GRAVITY, abs=0.1)
+    assert felt_drop(tuple((t, v, FREE_FALL, c) for t, v, _, c in MOMENTS)) == 0.0
+    # Nobody knows what was felt in a gap.
+    assert math.isnan(felt_drop((*MOMENTS[:5], *MOMENTS[9:])))
+    assert felt_drop(()) == 0.0
 
 
 def test_what_is_stuck_or_was_not_told_feels_nothing() -> None:

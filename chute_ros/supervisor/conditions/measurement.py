@@ -16,6 +16,7 @@ from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
     DERIVED,
+    FELT_DROP,
     FELT_FALL,
     STANDARD_LIMITS,
     TILT,
@@ -37,11 +38,19 @@ _CLAIMS = {
     VERTICAL_ACCELERATION: VERTICAL_SPEED,
     "sink_beyond_target": VERTICAL_SPEED,
     ACCELERATION: ACCELERATION,
+    FELT_DROP: ACCELERATION,
     FELT_FALL: ACCELERATION,
     TILT: TILT,
     "attitude_error": TILT,
 }
-_CLAIMED_BELOW = (VERTICAL_SPEED, CLIMB_RATE, VERTICAL_ACCELERATION, ACCELERATION, FELT_FALL)
+_CLAIMED_BELOW = (
+    VERTICAL_SPEED,
+    CLIMB_RATE,
+    VERTICAL_ACCELERATION,
+    ACCELERATION,
+    FELT_DROP,
+    FELT_FALL,
+)
 #: What can be wrong with a limit.
 NEVER, ALWAYS = "can never hold", "always holds"
 
