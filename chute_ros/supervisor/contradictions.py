@@ -178,8 +178,8 @@ def _felt(motion: tuple[Moment, ...]) -> float:
 
 
 def felt_fall(motion: tuple[Moment, ...]) -> float:
-    """The same of a fall that its estimator hides: one that it told as well is none, as what became
-    of it since, it tells, too. An accelerometer that is stuck feels none."""
+    """The same of a fall that its estimator hides: one that it told as well is none, as what
+    became of it since, it tells, too. An accelerometer that is stuck feels none."""
     fell = [one[2] for one in motion if one[2] < FREE_FALL]
     if len(fell) < 3 or max(fell) - min(fell) < _FORCE_LIVES:
         return 0.0

@@ -330,11 +330,12 @@ class FlightComputer:
 
     def _faults(self, now: float, pause: str) -> list[str]:
         assert self.record is not None
-        faults = []
+        faults, age = [], now - self.record.received
         if pause:
             faults.append(f"no telemetry: {pause}")
+        elif self._cable_pulled:
+            faults.append(f"the cable was pulled, or the port closed: no telemetry for {age:.1f} s")
         elif not self.fresh(now):
-            age = now - self.record.received
             faults.append(f"telemetry {self.liveness.state.name}: {age:.1f} s old")
         if self.mode is FlightMode.FAULT:
             faults.append("flight mode Fault")
@@ -350,16 +351,16 @@ class FlightComputer:
         return faults
 
     def _state(self, now: float, pause: str) -> ParachuteState:
-        """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest. Under a
-        drogue that is not the parachute it is LAUNCHED, and not deployed."""
+        """Onto the UPF numbering. A canopy that is out wins over all; a fault wins over the rest.
+        Under a drogue that is not the parachute it is LAUNCHED, and not deployed."""
         if self.deployed or self.landed:
             return ParachuteState.TOUCHDOWN if self.landed else ParachuteState.LAUNCHED
+        if self.flying and self.seen_out("drogue"):
+            return ParachuteState.LAUNCHED  # and the main, which is the parachute, is not out yet
         if pause and self.liveness.state is LinkState.OK:
             return ParachuteState.NOT_READY
         if self._faults(now, pause):
             return ParachuteState.ABNORMAL
-        if self.flying and self.seen_out("drogue"):
-            return ParachuteState.LAUNCHED  # and the main, which is the parachute, is not out yet
         return ParachuteState.ARMED if self.armed else ParachuteState.READY
 
 

@@ -209,6 +209,28 @@ def test_under_a_drogue_before_its_parachute_it_is_launched_and_not_deployed():
     assert (seen.state, seen.deployed, seen.healthy) == (_LAUNCHED, True, False)
 
 
+def test_a_fault_hides_no_drogue_that_is_out():
+    """Given a main that is the parachute: what asks for a deploy must see that a canopy is out."""
+    rocket = Rocket(main_counts=True)
+    for at, mode in ((0.0, STANDBY), (1.0, ASCENT), (2.0, COAST), (3.0, DROGUE), (3.1, DROGUE)):
+        rocket.says(at, mode)
+    rocket.says(3.2, DROGUE, altitude="NaN")
+    seen = status(rocket, 3.2)
+    assert (seen.state, seen.faults) == (_LAUNCHED, ("altitude is nan",))
+    rocket.says(3.3, FAULT)
+    assert status(rocket, 3.3).state is _LAUNCHED
+    assert status(rocket, 3.3).faults == ("flight mode Fault",)
+
+
+def test_a_pulled_cable_is_called_that():
+    rocket = flown((0.0, STANDBY))
+    rocket.computer.cable_pulled()
+    said = "the cable was pulled, or the port closed: no telemetry for 0.5 s"
+    assert status(rocket, 0.5).faults == (said,)
+    rocket.says(1.0, STANDBY)
+    assert status(rocket, 1.0).faults == ()
+
+
 def test_it_has_landed_when_its_altitude_rests_for_five_seconds_after_a_deployment():
     rocket = Rocket()
     end = rocket.descends(0.0, 10.0)
