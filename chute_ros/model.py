@@ -184,9 +184,13 @@ class ParachuteStatus:
     faults: tuple[str, ...] = ()
 
     @property
+    def before_parachute(self) -> bool:
+        """A drogue is out, and the parachute after it is not: LAUNCHED, and not deployed."""
+        return self.state is ParachuteState.LAUNCHED and not self.deployed
+
+    @property
     def healthy(self) -> bool:
-        """The device was heard in time, is whole, and its parachute can still be released: one
-        that is LAUNCHED and not deployed has a drogue out before it."""
+        """The device was heard in time, is whole, and its parachute can still be released."""
         if self.state is ParachuteState.LAUNCHED and self.deployed:
             return False
         return self.link_state is LinkState.OK and self.state in (

@@ -49,6 +49,8 @@ _CALM_SPEED, _CALM_TILT = 8.0, 60.0
 _SINKS_FOR_SURE = 4.0
 #: What ends a flight, after which a person may reset one that has been still for so long, s.
 _ENDED, STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
+#: Nothing that is not held flies steadily for so long, s.
+STEADY_FOR = 10.0
 #: No vehicle falls for so long at a steady speed, s.
 RESTS_FOR = 60.0
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
@@ -167,6 +169,12 @@ def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool
     off = armed(config, state, now) is Armed.DISARMED
     still = (off or state.stage in _ENDED) and now >= state.heard.still_since + STILL_FOR
     return still or now >= state.heard.rests_since + RESTS_FOR
+
+
+def flies_again(state: State, now: float) -> bool:
+    """It has flown steadily for so long after its autopilot started anew that it does not fall by
+    that any more."""
+    return now >= state.flight.steady_since + STEADY_FOR
 
 
 def says_rests(config: SupervisorConfig, state: State, now: float) -> bool:

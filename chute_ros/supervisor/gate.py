@@ -62,8 +62,10 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     in_flight = state.stage is Stage.IN_FLIGHT or (
         state.stage is Stage.KILLING and state.killing.killed_in_flight
     )
-    # Under a canopy that does not carry the next one may be released.
-    if not in_flight and not (state.stage is Stage.DEPLOYED and state.flight.airborne):
+    # Under a canopy that does not carry, or after orders that nobody confirmed, the next one may
+    # be released.
+    ordered = state.stage in (Stage.DEPLOYED, Stage.FAULT) and state.flight.airborne
+    if not in_flight and not ordered:
         return f"the vehicle is {state.stage.name}, not in flight"
     if state.stage is Stage.KILLING and _killed_alone(state):
         return "a person asked for the kill alone; safety/deploy releases"
@@ -79,13 +81,15 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
 
 def out_already(state: State, rung: Rung) -> bool:
     """The parachutes that this step of the ladder can release all say that they are released, or
-    its node has reported that it is."""
+    its node has reported that it is; but one with a drogue out has its parachute left."""
+    devices = state.evidence(rung.link).devices
+    meant = [s for name, s in devices.items() if rung.device in ("", TRIGGER, name)]
+    if any(status.before_parachute for status in meant):
+        return False
     step = ((rung.link,), rung.device)
     confirmed = [deploy.decision for deploy in state.deploying.deploys if deploy.confirmed]
     if any((decision.targets, decision.device) == step for decision in confirmed):
         return True
-    devices = state.evidence(rung.link).devices
-    meant = [s for name, s in devices.items() if rung.device in ("", TRIGGER, name)]
     return bool(meant) and all(status.deployed for status in meant)
 
 

@@ -227,6 +227,6 @@ def _check_deploy(reader: ProfileLines, what: str, line: int, rule: Rule) -> Non
     if silence >= rule.needed - 1e-9:
         text = f"{what} would deploy on silence alone, which is never done"
         reader.wrong(line, f"{text}: raise needed above {silence:g}, or add a measurement")
-    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYED}:
+    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYED, Stage.FAULT}:
         text = f"{what} would deploy out of flight, which is never done"
-        reader.wrong(line, f"{text}: its states may be IN_FLIGHT, KILLING and DEPLOYED")
+        reader.wrong(line, f"{text}: its states may be IN_FLIGHT, KILLING, DEPLOYED and FAULT")

@@ -78,6 +78,8 @@ class ThisFlight:
     up_for: float = 0.0
     #: The autopilot started anew since the take-off.
     rebooted: bool = False
+    #: Since when it has flown steadily after that; infinity: it does not.
+    steady_since: Time = math.inf
     #: Restarts of the autopilot that had been counted on the ground.
     reboots_before: int = 0
     #: Height when it was armed, m; 0: not seen.

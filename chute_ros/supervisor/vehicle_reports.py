@@ -33,6 +33,8 @@ _OF_NEWEST = 0.1
 _SILENCE = 0.5
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
+#: One that flies steadily leans by no more, degrees.
+_LEVEL = 45.0
 #: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); a sensor is
 #: found fit or unfit by the samples of so long, s.
 _AT_REST, _FITNESS_TAKES = (7.8, 11.8), 1.0
@@ -68,7 +70,7 @@ def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
     _note_heights_told(turn)
     _note_contradictions(turn)
     _note_height_of_kill(turn)
-    _note_reboots(turn, new)
+    _note_reboots(turn, new, new.reboot_count > state.heard.vehicle.reboot_count)
     _note_faults(turn, new.faults)
     if was_disarmed and new.armed is Armed.ARMED:
         height = readings.measured(turn.config, turn.state, "height", turn.now)
@@ -221,7 +223,9 @@ def _judged_at_rest(turn: Turn) -> dict[str, str]:
     """Measurement of a vehicle that stands -> what it tells that cannot be, in words; empty:
     nothing."""
     state, config, now = turn.state, turn.config, turn.now
-    if state.flight.airborne or flight.says_down(config, state, now) is not True:
+    if state.flight.airborne:
+        return _judged_aloft(turn)
+    if flight.says_down(config, state, now) is not True:
         return {}
     limit, judged = config.profile.moving_speed, {}
     known = state.measured(ACCELERATION)
@@ -238,6 +242,16 @@ def _judged_at_rest(turn: Turn) -> dict[str, str]:
             wrong = _moves(value, limit) if abs(value) > limit else ""
             judged |= dict.fromkeys(names, wrong)
     return judged
+
+
+def _judged_aloft(turn: Turn) -> dict[str, str]:
+    """What told on the ground what cannot be there, as of one that a balloon or a ship carries, is
+    well again once it and another origin tell of a level flight."""
+    known = turn.state.measured(VERTICAL_SPEED)
+    speed = known.usable(turn.config.profile.limits[VERTICAL_SPEED], turn.now)
+    rate = readings.told_rate(turn.config, turn.state, PRESSURE_ALTITUDE, turn.now)
+    level = abs(speed) <= (limit := turn.config.profile.moving_speed) and abs(rate) <= limit
+    return dict.fromkeys((VERTICAL_SPEED, HEIGHT, PRESSURE_ALTITUDE), "") if level else {}
 
 
 def _cannot_move(turn: Turn, force: float, speed: float) -> bool:
@@ -275,7 +289,7 @@ def _note_faults(turn: Turn, faults: tuple[str, ...]) -> None:
         turn.heard = replace(turn.heard, faults_told=faults if turn.flight.airborne else ())
 
 
-def _note_reboots(turn: Turn, new: VehicleState) -> None:
+def _note_reboots(turn: Turn, new: VehicleState, just_now: bool) -> None:
     """Restarts on the ground do not count; a node that counts from 0 again has restarted."""
     state = turn.state
     before = min(state.flight.reboots_before, new.reboot_count)
@@ -285,8 +299,22 @@ def _note_reboots(turn: Turn, new: VehicleState) -> None:
     if again and state.flight.airborne and not state.flight.rebooted:
         turn.warn("the autopilot started anew in flight")
     rebooted = state.flight.rebooted or (again and state.flight.airborne)
+    _note_steady(turn, new, rebooted and not just_now)
     if (before, rebooted) != (state.flight.reboots_before, state.flight.rebooted):
         # Heights from before it may be above another ground.
         heights = state.heard.heights if rebooted == state.flight.rebooted else ()
         turn.flight = replace(turn.flight, reboots_before=before, rebooted=rebooted)
         turn.heard = replace(turn.heard, heights=heights)
+
+
+def _note_steady(turn: Turn, new: VehicleState, rebooted: bool) -> None:
+    """After a restart in flight: armed again, neither sinking nor leaning as what falls does."""
+    speed = readings.measured(turn.config, turn.state, VERTICAL_SPEED, turn.now)
+    tilt = readings.measured(turn.config, turn.state, TILT, turn.now)
+    if rebooted and flight.flies_again(turn.state, turn.now):
+        return
+    level = abs(speed) <= turn.config.profile.moving_speed and tilt <= _LEVEL
+    steady = rebooted and level and new.armed is Armed.ARMED
+    since = min(turn.flight.steady_since, turn.now) if steady else math.inf
+    if since != turn.flight.steady_since:
+        turn.flight = replace(turn.flight, steady_since=since)

@@ -267,6 +267,7 @@ def leader(clock: float) -> State:
             was_high=True,
             airborne_since=clock - 32.0,
             rebooted=True,
+            steady_since=clock - 1.5,
             reboots_before=3,
             armed_height=2.0,
             took_off_height=3.0,

@@ -359,6 +359,28 @@ def test_what_sinks_on_the_ground_is_named_and_counts_for_nothing(
     assert story.fired() == []
 
 
+@AIRCRAFT
+def test_what_was_carried_up_as_it_stood_is_used_again_once_it_flies(profile: str) -> None:
+    """Let go by a balloon or a ship: nothing stays unfit for a whole flight."""
+    teller, up = told_to(profile), 0.0
+    for k in range(300):
+        up = 0.4 * k
+        carried = DOWN if k < 200 else {"landed_state": LandedState.ON_GROUND}
+        told = {"height": up, "vertical_speed": 4.0, "tilt": 4.0, "force": 9.8}
+        teller.tell(**carried, **told, true_height=up)
+    assert "vertical_speed" in teller.story.state.heard.unfit
+    for _ in range(100):
+        speed = teller.noise(0.2)
+        teller.tell(height=up, vertical_speed=speed, tilt=3.0, force=9.8, true_height=up)
+    assert teller.story.state.heard.unfit == {}
+    for k in range(40):
+        speed = -min(9.8 * 0.1 * k, 22.0)
+        up += 0.1 * speed
+        told = {"vertical_speed": speed, "tilt": min(30.0 * k * 0.1, 110.0), "force": 1.0}
+        teller.tell(height=up, true_height=up, **told)
+    assert deployed(teller)
+
+
 def test_what_was_moved_as_it_stood_is_used_again_once_it_stands() -> None:
     """In a lift, or on a car that drives up a hill."""
     teller = told_to("multirotor")

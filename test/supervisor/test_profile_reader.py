@@ -550,7 +550,7 @@ CONDITION_KEYS = (
     "counted, weight"
 )
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
-FLYING = "its states may be IN_FLIGHT, KILLING and DEPLOYED"
+FLYING = "its states may be IN_FLIGHT, KILLING, DEPLOYED and FAULT"
 KINDS = "needs one of measurement, link, autopilot, device; it has"
 
 
@@ -666,7 +666,7 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
             "device: abnormal -> device: 7",
             (
                 "19: device in rule 'falls' is 7: need asks_for_kill or deployed or abnormal or "
-                "nothing_out"
+                "nothing_out or drogue_out"
             ),
         ),
         (

@@ -9,10 +9,11 @@ from random import Random
 from typing import Any
 
 import pytest
-from story import LINK, Story, parachute, shipped
+from story import LINK, START, Story, parachute, shipped
 
 from chute_ros.model import Action, Armed, LinkState, Outcome, ParachuteState, ParachuteStatus
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.gate import against_person
 from chute_ros.supervisor.machine import Stage
 
 K, D = Action.KILL, Action.DEPLOY
@@ -152,11 +153,11 @@ DEPLOYS = [
             **LEANS,
         )
     ),
-    empty("multirotor", sink=6.0, hold=0.5),
+    empty("multirotor", sink=6.5, hold=0.5),
     Case(
         *("multirotor", "battery dead and falling"),
-        {"battery_remaining": 0.049, "vertical_speed": -6.1},
-        {"battery_remaining": 0.051, "vertical_speed": -6.1},
+        {"battery_remaining": 0.049, "vertical_speed": -6.6},
+        {"battery_remaining": 0.051, "vertical_speed": -6.6},
         0.5,
         before=BEFORE,
     ),
@@ -291,7 +292,7 @@ def test_every_rule_has_its_story(name: str) -> None:
     told |= {"disarmed in flight", "uncommanded sink", "sinks fast", "canopy does not carry"}
     told |= {"sinks fast under a canopy", "killed and falling", "ballistic"}
     told |= {"fall that its estimator does not tell", "off its command"}
-    told |= {"spin that its estimator does not tell"}
+    told |= {"spin that its estimator does not tell", "main overdue", "main late"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -459,6 +460,59 @@ def test_a_rocket_that_falls_on_under_a_canopy_is_an_alarm_that_does_not_stop() 
     assert any("the canopy does not carry, and no other is left" in one for one in story.alarms())
 
 
+def falls_on(story: Story, height: float, until: float, fastest: float) -> float:
+    """It speeds up to this, m/s, for so long, s; where it is then."""
+    begun = story.t
+    while story.t < begun + until:
+        speed = -min(30.0 + 9.81 * (story.t - begun), fastest)
+        height += 0.1 * speed
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed)
+    return height
+
+
+@pytest.mark.parametrize("flagged", [True, False])
+def test_a_drogue_of_ours_that_does_not_carry_is_followed_by_the_main(flagged: bool) -> None:
+    """Given `deploy_stage` next, and a charge that is a dud; not every firmware sets a flag."""
+    story, height = Story(shipped("rocket")).ready().fly(1.0, height=3700.0), 3700.0
+    height = falls_on(story, height, 3.0, 73.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    if flagged:
+        story.at(story.t + 0.01, under_drogue(), story.report(Action.DEPLOY, Outcome.CONFIRMED))
+        assert story.state.stage is Stage.DEPLOYED
+        assert against_person(story.config, story.state, True, START + story.t) == ""
+    else:
+        story.at(story.t + 0.01, story.report(Action.DEPLOY, Outcome.SENT))
+        falls_on(story, height, story.config.deploy_timeout, 73.0)
+    falls_on(story, height, 8.0, 73.0)
+    assert "canopy does not carry" in {one.rule for one in story.decisions(D)}
+
+
+@pytest.mark.parametrize(("sinks", "fires"), [(22.0, True), (12.5, True), (8.0, False)])
+def test_a_main_that_is_overdue_is_ordered(sinks: float, fires: bool) -> None:
+    """Given a drogue that is out, and a main that is the parachute and never comes."""
+    story, height = Story(shipped("rocket")).ready().fly(1.0, height=600.0), 600.0
+    story.at(story.t + 0.01, under_drogue())
+    while height > 30.0:
+        height -= 0.1 * sinks
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=-sinks)
+        if "DEPLOY" in story.fired():
+            break
+    assert ("DEPLOY" in story.fired()) is fires
+    if fires:
+        assert story.newest(D).rule == "main overdue"
+        assert 90.0 < height < 150.0 - sinks
+
+
+def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told() -> None:
+    story, height = Story(shipped("rocket")).ready().fly(1.0, height=300.0), 300.0
+    story.at(story.t + 0.01, parachute(deployed=True))
+    while height > 50.0:
+        height -= 2.2
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=-22.0)
+    assert any("fire the main by hand" in one for one in story.alarms())
+    assert "DEPLOY" not in story.fired()
+
+
 def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
     story = Story(shipped("rocket")).ready().fly(1.0)
     abnormal(story)
@@ -531,3 +585,59 @@ def test_an_autopilot_that_falls_silent_with_everything_else_is_an_alarm_in_its_
     assert alarms(story, "autopilot lost") == 1
     story.at(60.0)
     assert story.fired() == []
+
+
+#: A wing that dives on purpose, and what its command is.
+DIVE = {"vertical_speed": -11.0, "tilt": 25.0, "attitude_error": 4.0, "acceleration": 9.0}
+
+
+@pytest.mark.parametrize("before", [{"battery_remaining": 0.0}, REBOOTED])
+def test_a_dive_that_is_commanded_is_no_fall_beside_an_empty_battery_or_a_restart(
+    before: dict[str, Any],
+) -> None:
+    story = Story(shipped("fixed_wing")).ready().fly(2.0, height=120.0)
+    story.fly(3.0, height=120.0, **before)
+    height = 120.0
+    for _ in range(60):
+        height -= 0.55
+        story.fly(story.t + 0.05, height=height, **DIVE, **before)
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize(("steady", "fires"), [(5.0, True), (30.0, False)])
+@pytest.mark.parametrize(
+    ("profile", "does"),
+    [
+        ("multirotor", {"vertical_speed": -5.3}),
+        ("fixed_wing", {"tilt": 74.0, "acceleration": 35.0}),
+    ],
+)
+def test_a_restart_after_which_it_flew_on_ends_no_manoeuvre_of_later(
+    profile: str, does: dict[str, Any], steady: float, fires: bool
+) -> None:
+    """ArduPlane arms itself again after its watchdog, and flies on."""
+    story = Story(shipped(profile)).ready().fly(2.0, height=120.0)
+    story.fly(2.0 + steady, height=120.0, **REBOOTED)
+    story.fly(story.t + 2.0, **{"height": 118.0, **does, **REBOOTED})
+    assert bool(story.fired()) is fires
+    # What falls by the next restart falls by that.
+    again = {"reboot_count": 2, "rebooted_in_flight": True}
+    story.fly(story.t + 1.0, height=110.0, **again)
+    story.fly(story.t + 2.0, height=110.0, **{**does, **again})
+    assert story.fired()
+
+
+@pytest.mark.parametrize(("slows", "fires"), [(1.5, False), (0.0, True)])
+def test_a_descent_that_is_caught_with_full_thrust_is_no_sink_that_goes_on(
+    slows: float, fires: bool
+) -> None:
+    """Full thrust upright counts as a command not to sink."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=150.0)
+    speed, height = 0.0, 150.0
+    for k in range(90):
+        descends = k < 50
+        change = -0.2 if descends else 0.1 * slows
+        height, speed = height + 0.1 * speed, min(max(speed + change, -9.0), -1.0)
+        told = {"target_vertical_speed": -9.0 if descends else 0.0, "acceleration": 9.8 + slows}
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed, **told)
+    assert bool(story.fired()) is fires

@@ -65,7 +65,7 @@ def test_what_a_profile_leaves_out_is_as_its_page_says() -> None:
         (Clears, "never on_disarm by_itself"),
         (BelowMinimum, "deploy kill nothing"),
         (AutopilotFact, "lost rebooted disarmed emergency killed_aloft motors_stopped"),
-        (DeviceFact, "asks_for_kill deployed abnormal nothing_out"),
+        (DeviceFact, "asks_for_kill deployed abnormal nothing_out drogue_out"),
     ],
 )
 def test_the_words_of_a_profile_are_those_of_its_page(kind: type[enum.Enum], words: str) -> None:

@@ -31,6 +31,8 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
     """Its link is an UmbilicalLink."""
 
     PICTURES = (*DeviceRuntime.PICTURES, TelemetryReceived, LogLine)
+    #: The rule of the newest deploy that was decided.
+    _ordered_by = ""
 
     def summarise(self, link: UmbilicalLink, now: float) -> Summary:
         computer = link.computer
@@ -62,7 +64,12 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
             self.desk.request_for(decision, kill)
         elif decision.action is Action.DEPLOY:
             force = self.settings.link.decided_deploy_forces
-            self.deploy_for(decision, lambda link, token, now: link.deploy(token, force, now))
+            # What the same rule orders again, as nothing was confirmed, is the same deploy.
+            repeated, self._ordered_by = decision.rule == self._ordered_by, decision.rule
+            self.deploy_for(
+                decision,
+                lambda link, token, now: link.deploy(token, force, now, repeated=repeated),
+            )
         elif decision.action is not Action.NONE:
             self.carry_out_flight_block(
                 decision, "launch is refused", "launch is left to the gate"

@@ -81,6 +81,8 @@ class AutopilotCondition(Condition):
     ) -> Iterable[float]:
         """When what it says is too old, and when what tells of a fall is."""
         told = [state.heard.vehicle_received + config.vehicle_state_age]
+        if self.fact is AutopilotFact.REBOOTED:
+            told.append(state.flight.steady_since + flight.STEADY_FOR)
         if self.fact is AutopilotFact.KILLED_ALOFT:
             names = [name for sign in FALL_SIGNS for name in known_by(sign)]
             limits = config.profile.limits
@@ -89,7 +91,7 @@ class AutopilotCondition(Condition):
 
 
 def _rebooted(config: SupervisorConfig, state: State, now: float) -> Finding:
-    rebooted = state.flight.rebooted
+    rebooted = state.flight.rebooted and not flight.flies_again(state, now)
     return Finding(rebooted, lambda: f"autopilot restarts in flight {int(rebooted)}")
 
 

@@ -25,6 +25,8 @@ class DeviceFact(enum.Enum):
     ABNORMAL = "abnormal"
     #: No canopy at all, a drogue included, as far as anybody has told in this flight.
     NOTHING_OUT = "nothing_out"
+    #: A drogue is out, and the parachute after it is not.
+    DROGUE_OUT = "drogue_out"
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,14 @@ class DeviceCondition(Condition):
                 return f"{who}: its own status says deployed" if out else "no parachute is out"
 
             return Finding(bool(out), tell)
+        if self.fact is DeviceFact.DROGUE_OUT:
+            under = [
+                f"{name} {device} says LAUNCHED, and not deployed"
+                for name in names
+                for device, status in state.evidence(name).devices.items()
+                if status.before_parachute
+            ]
+            return Finding(bool(under), lambda: "; ".join(under) or "no drogue alone is out")
         if self.fact is DeviceFact.NOTHING_OUT:
             # What came out stays out, however old the word is.
             canopies = [

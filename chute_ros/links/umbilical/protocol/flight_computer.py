@@ -334,7 +334,9 @@ class FlightComputer:
         if pause:
             faults.append(f"no telemetry: {pause}")
         elif self._cable_pulled:
-            faults.append(f"the cable was pulled, or the port closed: no telemetry for {age:.1f} s")
+            faults.append(
+                f"the cable was pulled, or the port closed: no telemetry for {age:.1f} s"
+            )
         elif not self.fresh(now):
             faults.append(f"telemetry {self.liveness.state.name}: {age:.1f} s old")
         if self.mode is FlightMode.FAULT:

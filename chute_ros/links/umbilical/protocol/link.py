@@ -155,9 +155,12 @@ class UmbilicalLink(EventLog):
             return
         self.command(token, "key_arm" if arm else "key_disarm", False, now)
 
-    def deploy(self, token: int, force: bool, now: float, again: bool = False) -> None:
-        """Fire what the configuration says. again: though telemetry reports that it is out."""
-        self.orders.deploy(token, force, again, now)
+    def deploy(
+        self, token: int, force: bool, now: float, again: bool = False, repeated: bool = False
+    ) -> None:
+        """Fire what the configuration says. again: though telemetry reports that it is out;
+        repeated: the same deploy as the one before."""
+        self.orders.deploy(token, force, again, repeated, now)
         self._drive(now)
 
     def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:

@@ -78,13 +78,16 @@ class Orders(EventLog):
         even_if_shown = force or name not in ("drogue", "main")
         self._order(token, kind, force, even_if_shown, now)
 
-    def deploy(self, token: int, force: bool, again: bool, now: float) -> None:
-        """Fire the stage of the configuration. again: though telemetry reports that it is out."""
+    def deploy(self, token: int, force: bool, again: bool, repeated: bool, now: float) -> None:
+        """Fire the stage of the configuration. again: though telemetry reports that it is out;
+        repeated: the same deploy as the one before, which no telemetry has confirmed."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
-            # The same deploy may be ordered once more, as by a supervisor that took over.
-            again_of_it = self._requests.under_way("drogue")
-            over = self._computer.was_fired("drogue", now) and not again_of_it
+            # The same deploy may be ordered once more, as by a supervisor that took over, or one
+            # that tries again what some firmware never shows: the main has its time.
+            hidden = repeated and not self._computer.surely_out("drogue")
+            same = hidden or self._requests.under_way("drogue")
+            over = self._computer.was_fired("drogue", now) and not same
             stage = DeployStage.MAIN if over else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 

@@ -144,6 +144,22 @@ def test_the_next_stage_is_the_same_one_while_its_order_is_under_way():
     assert bench.after(0.5).tokens[-1] == "<d>"
 
 
+def test_a_deploy_that_is_tried_again_is_no_order_for_the_main():
+    """Given firmware that sets no flag for <D>, and a drogue that carries."""
+    bench = ready(COAST, deploy=DeployStage.NEXT)
+    bench.deploy()
+    bench.after(12.0).clear()
+    bench.deploy(repeated=True)
+    assert set(bench.after(12.0).tokens) == {"<D>"}
+    bench.clear()
+    bench.deploy()
+    assert bench.after(1.0).tokens[0] == "<d>", "another order"
+    bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1)
+    bench.talk(ssa_drogue_deployed=1).after(0.3).clear()
+    bench.deploy(repeated=True)
+    assert bench.after(0.3).tokens == ["<d>"], "its drogue is known to be out"
+
+
 def test_it_ends_when_the_time_is_up_and_says_so():
     bench = ready(ASCENT)
     number = bench.deploy()

@@ -175,9 +175,9 @@ class Bench:
         self.collect()
         return self._number
 
-    def deploy(self, force=False, again=False):
+    def deploy(self, force=False, again=False, repeated=False):
         self._number += 1
-        self.link.deploy(self._number, force, self.now, again)
+        self.link.deploy(self._number, force, self.now, again, repeated)
         self.collect()
         return self._number
 
