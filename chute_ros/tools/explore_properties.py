@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -73,19 +72,6 @@ class Memory:
     deploy_numbers: frozenset[tuple[int, int]] = frozenset()
     deploy_confirmed: bool = False
     newest: tuple[int, int] = (0, 0)
-
-    def canonical(self, config: SupervisorConfig, now: float) -> Hashable:
-        """Equal for two that judge the same from now on."""
-        waited = min(round(now - self.killed_at, 3), config.kill_to_deploy_delay)
-        since = waited if self.kill is not None else None
-        left = self.height_left(now)
-        return (
-            since,
-            self.kill_confirmed,
-            self.kill_standing,
-            self.deploy_confirmed,
-            round(left, 3) if left >= config.profile.minimum_height else None,
-        )
 
     def height_left(self, now: float) -> float:
         """At least so many m are left of its height since the kill; NaN: not known."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.arguments import positive
-from chute_ros.tools.explore_key import canonical
 from chute_ros.tools.explore_properties import (
     PROPERTIES,
     Memory,
@@ -80,10 +79,9 @@ class Node:
 class Found:
     """What became of an exploration."""
 
-    states: int = 0
-    transitions: int = 0
     updates: int = 0
-    new_at: list[int] = field(default_factory=list)
+    #: At each depth.
+    stories: list[int] = field(default_factory=list)
     story: list[str] = field(default_factory=list)
     violation: ViolationError | None = None
 
@@ -98,25 +96,15 @@ class Explorer:
 
     def explore(self, depth: int, beginnings: dict[str, tuple[str, ...]] = BEGINNINGS) -> Found:
         """Every story of up to depth steps from these beginnings."""
-        seen: set[Hashable] = set()
         try:
-            front = list(self._new(map(self._begun, beginnings.values()), seen))
+            front = list(map(self._begun, beginnings.values()))
             for level in range(1, depth + 1):
-                front = list(self._new(self._after(front), seen))
-                self.found.new_at.append(len(front))
-                print(f"depth {level}: {len(seen)} states", file=sys.stderr, flush=True)
+                front = list(self._after(front))
+                self.found.stories.append(len(front))
+                print(f"depth {level}: {len(front)} stories", file=sys.stderr, flush=True)
         except ViolationError as violation:
             self.found.violation = violation
-        self.found.states = len(seen)
         return self.found
-
-    def _new(self, nodes: Iterator[Node], seen: set[Hashable]) -> Iterator[Node]:
-        for node in nodes:
-            memory = node.memory.canonical(self.config, node.now)
-            key = (canonical(self.config, node.state, node.now), memory)
-            if key not in seen:
-                seen.add(key)
-                yield node
 
     def _begun(self, names: tuple[str, ...]) -> Node:
         node = Node(State(epoch=7, started_at=START), Memory(), START, 0)
@@ -128,12 +116,8 @@ class Explorer:
         return node
 
     def _after(self, front: list[Node]) -> Iterator[Node]:
-        for node in front:
-            for step in self.steps:
-                after = self._taken(node, step)
-                if after is not None:
-                    self.found.transitions += 1
-                    yield after
+        taken = (self._taken(node, step) for node in front for step in self.steps)
+        return (after for after in taken if after is not None)
 
     def _taken(self, node: Node, step: Step) -> Node | None:
         """The node after a step, checked at each of its updates; None: it is not possible."""
@@ -178,7 +162,7 @@ def page(found: Found, properties: Properties, depth: int, alphabet: int) -> str
         depth=depth,
         alphabet=alphabet,
         found=found,
-        levels=", ".join(map(str, found.new_at)),
+        stories=", ".join(map(str, found.stories)),
         ladder=", ".join(LADDER),
         tick=TICK,
         held_for=HELD,
@@ -201,15 +185,12 @@ At every update all properties were checked; all held.
 |---|---|
 | steps to choose from | {alphabet} |
 | depth after each beginning | {depth} |
-| distinct states | {found.states} |
-| new ones at each depth | {levels} |
-| transitions | {found.transitions} |
+| stories at each depth | {stories} |
 | updates of the core | {found.updates} |
 
 A step is an input of the vehicle, a link, a parachute, a device or a person, for {tick:g} s or for
 {held_for:g} s (just over the longest hold of a rule that fires and of a landing), or silence for
-{silence:g} s (just over the longest limit). `chute_ros/tools/explore_steps.py` lists them. States
-are the same if all their later decisions are the same: `chute_ros/tools/explore_key.py`.
+{silence:g} s (just over the longest limit). `chute_ros/tools/explore_steps.py` lists them.
 
 | beginning | steps that lead there from the start |
 |---|---|
@@ -240,7 +221,7 @@ def main() -> None:
     exercised = explorer.properties.exercised
     for name, text in PROPERTIES.items():
         print(f"{exercised[name]:9} checks: {text}")
-    told = f"{found.states} states, {found.transitions} transitions, depth {depth}"
+    told = f"{sum(found.stories)} stories, depth {depth}"
     print(f"{told}; {time.monotonic() - began:.0f} s")
     if never := [name for name in PROPERTIES if not exercised[name]]:
         sys.exit(f"never exercised: {', '.join(never)}")
