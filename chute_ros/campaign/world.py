@@ -34,11 +34,6 @@ class World:
         self._deadlines: dict[Part, float] = {}
         self._alarms: dict[Part, float] = {}
 
-    @property
-    def is_empty(self) -> bool:
-        """Nothing is to come."""
-        return not self._due
-
     def post(self, when: float, deliver: Callable[[float], None]) -> None:
         """Have deliver(now) called then; of two at the same time the one posted first."""
         heapq.heappush(self._due, (max(when, self.now), next(self._order), deliver))

@@ -129,11 +129,6 @@ def supervisor_task(
     return status(node, "supervisor", level, text, every, "")
 
 
-def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:
-    """Task of a device on a link on which none was received."""
-    return status(node, task, STALE, "never received", {}, "")
-
-
 def liveness_values(live: Liveness, now: float) -> dict[str, object]:
     """Reception of a device; times in s, NaN: has not happened."""
     return {

@@ -381,8 +381,3 @@ class UpfBench(RecordingBench[HeardTransfer]):
             names.PARACHUTE_STATUS, within, lambda one: one.values["state"] == number
         )
         return told is not None
-
-    def vehicle_requests(self, since: int) -> list[str]:
-        """What it has asked of the vehicle, from this place of heard on, by name."""
-        every = (one.values for one in self.heard[since:] if one.kind == names.VEHICLE_SERVICE)
-        return [self.definitions.type_name(names.VEHICLE_SERVICE, one) for one in every]
