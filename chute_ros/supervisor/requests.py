@@ -97,11 +97,13 @@ def deploy_request(turn: Turn, one: i.DeployRequest) -> None:
     """Refused on the ground unless forced; one that is under way is joined."""
     wrong = against_person(turn.config, turn.state, one.force, turn.now)
     reason = f"operator{', forced' if one.force else ''}: {one.reason or 'no reason given'}"
-    if wrong:
-        turn.finish(one.token, False, False, "refused: " + wrong)
-    elif turn.state.mode is not i.Mode.ACTIVE:
-        order_deploy(turn, OPERATOR, (reason,))
+    if turn.state.mode is not i.Mode.ACTIVE:
+        # Whatever else is against it: no force sends anything in this mode.
+        if not wrong:
+            order_deploy(turn, OPERATOR, (reason,))
         _nothing_sent(turn, one.token)
+    elif wrong:
+        turn.finish(one.token, False, False, "refused: " + wrong)
     else:
         tokens = (*turn.own.deploy_tokens, one.token)
         turn.own = replace(turn.own, deploy_tokens=tokens)

@@ -51,6 +51,10 @@ def in_shadow() -> Story:
     return Story(mode=i.Mode.SHADOW).flying()
 
 
+def on_ground_in_shadow() -> Story:
+    return Story(mode=i.Mode.SHADOW).ready()
+
+
 def inhibited() -> Story:
     return Story(mode=i.Mode.INHIBITED).flying()
 
@@ -89,6 +93,8 @@ NOT_SENT = "mode is SHADOW; nothing is sent"
         (in_shadow, FALLS, NOT_SENT),
         (inhibited, STOP, "mode is INHIBITED; nothing is sent"),
         (inhibited, FALLS, "mode is INHIBITED; nothing is sent"),
+        # Force would send nothing either, and is no remedy to name.
+        (on_ground_in_shadow, FALLS, NOT_SENT),
         (ready, FALLS, "the vehicle is READY, not in flight; force deploys all the same"),
         (flying, i.ResetRequest(1), "the vehicle is in the air"),
         (Story, i.ResetRequest(1), "the vehicle is STARTUP"),
