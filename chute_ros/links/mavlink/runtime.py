@@ -9,6 +9,7 @@ from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import NAN, Action, Armed, Decision, LinkState, VehicleState
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import SafetyPicture
 from chute_ros.settings import nested, parameter
@@ -20,10 +21,11 @@ _DISARMED = "a vehicle that arms on the ground is disarmed from now on; in the a
 
 _NO_PARACHUTE = (
     "no parachute was received: check its power and wiring, parachute_system_id, and that its "
-    "HEARTBEAT (type MAV_TYPE_PARACHUTE, 43) reaches this connection"
+    f"HEARTBEAT (type MAV_TYPE_PARACHUTE, {dialect.MAV_TYPE_PARACHUTE}) reaches this connection"
 )
 _HEARTBEATS_ALONE = (
-    "sends heartbeats but no PARACHUTE_STATUS (430), although requested: check its "
+    f"sends heartbeats but no PARACHUTE_STATUS ({dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS}), "
+    "although requested: check its "
     "firmware, and that every router on the way passes it on (ArduPilot does with "
     "MAVn_OPTIONS bit 3; PX4 does not)"
 )
