@@ -53,6 +53,8 @@ class EffectLoop(Generic[CommandT]):
         self._sends = 0
         self._result = NO_ANSWER
         self._answer = ""
+        #: The newest word that it is at it, as long as no answer came after it.
+        self._progress = ""
         self._newest_accepted = self._refused = False
         self._commands: list[CommandT] = []
         self._refreshes: list[CommandT] = []
@@ -76,12 +78,14 @@ class EffectLoop(Generic[CommandT]):
     @property
     def answer(self) -> str:
         """The newest answer, in words."""
-        return self._answer or "not answered"
+        return self._newest or "not answered"
 
-    def command_sent(self, command: CommandT, now: float) -> None:
-        """One of the goal's commands went out (it may have waited for its turn)."""
-        if command != self.goal.commands[-1]:
-            return
+    @property
+    def _newest(self) -> str:
+        return "; ".join(part for part in (self._answer, self._progress) if part)
+
+    def command_sent(self, now: float) -> None:
+        """The goal's order went out (it may have waited for its turn)."""
         self._sends += 1
         if self._sends == 1:
             self._reports.append(Report(self.token, Outcome.SENT, f"{self.goal.name} sent"))
@@ -94,12 +98,13 @@ class EffectLoop(Generic[CommandT]):
                 self._end(True, f"{self.goal.name} sent; {self.goal.effect}")
 
     def command_finished(self, answer: Answer, now: float) -> None:
-        """The transaction of the goal's last command ended."""
+        """The transaction of the goal's order ended."""
         if self.phase is not Phase.WAIT_ACKNOWLEDGEMENT:
             return
         self._answer = answer.text()
         if answer.result != NO_ANSWER:
             self._result, self._newest_accepted = answer.result, answer.accepted
+            self._progress = ""
         if answer.accepted:
             self._take(Happening.ACCEPTED)
             waited = now - self._started
@@ -127,6 +132,10 @@ class EffectLoop(Generic[CommandT]):
                 self._refused = True
                 detail = f"{self.goal.name} {self._answer}; tried again"
                 self._reports.append(Report(self.token, Outcome.REFUSED, detail))
+
+    def in_progress(self, words: str) -> None:
+        """The device said that it is still at it."""
+        self._progress, self._newest_accepted = words, False
 
     def effect_may_show(self, now: float) -> None:
         """The device said something: look whether it shows the effect."""
@@ -213,7 +222,7 @@ class EffectLoop(Generic[CommandT]):
         return reports
 
     def _send(self) -> None:
-        self._commands += self.goal.commands
+        self._commands.append(self.goal.commands[-1])
         self._deadline = math.inf
         self._looks = []
 
@@ -240,7 +249,7 @@ class EffectLoop(Generic[CommandT]):
         text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
         not_shown = f"the device's own status never showed that {self.goal.effect}"
         if not math.isnan(self._accepted_after):
-            newest = "" if self._newest_accepted else f"; newest answer: {self._answer}"
+            newest = "" if self._newest_accepted else f"; newest answer: {self._newest}"
             acknowledged = f"acknowledged after {self._accepted_after:.2f} s"
             return f"{text}{acknowledged}, but {not_shown}{newest}"
         if not self._sends and self.goal.unacknowledged:
@@ -249,7 +258,7 @@ class EffectLoop(Generic[CommandT]):
             return f"{text}never sent: an earlier command of the same number was under way"
         if self.goal.unacknowledged:
             return f"{text}{self._sent_text()}, but {not_shown}"
-        answer = self._answer or "no acknowledgement came"
+        answer = self._newest or "no acknowledgement came"
         if self.goal.shown is None or self.goal.shown():
             return text + answer
         return f"{text}{answer}, and {not_shown}"

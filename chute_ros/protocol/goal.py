@@ -83,7 +83,8 @@ class Answer(Protocol):
 class ConfirmedCommand(Generic[CommandT]):
     """What to send and how to see that it worked.
 
-    commands: sent in this order; the last one's acknowledgement counts, those before prepare it.
+    commands: the last one is the order, whose answer counts. Those before it prepare it: each time
+    it leaves, they leave right before it, and what is answered to them neither ends nor delays it.
     shown: True once the device's own status shows the effect; None: the acknowledgement is all
     that there is to see. refresh: asks the device for the status that shows it.
     insist: no refusal but time ends the tries. urgent: does not queue behind another command.

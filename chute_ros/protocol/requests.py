@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import EffectLoop
 from chute_ros.protocol.events import EventLog, RequestFinished, RequestReport, ended
-from chute_ros.protocol.goal import ConfirmedCommand, EffectFinished, EffectLimits
+from chute_ros.protocol.goal import ConfirmedCommand, EffectFinished, EffectLimits, Report
 
 
 class Watch(Protocol):
@@ -67,16 +67,26 @@ TransactionsT = TypeVar("TransactionsT", bound=Transactions[Any])
 
 
 @dataclass(frozen=True)
-class _Running:
-    #: Of the goal, and of those that were begun beside it (ConfirmedCommand.otherwise).
-    loops: list[EffectLoop[Any]]
-    watch: Watch | None
-    follow_up: tuple[ConfirmedCommand[Any], Watch] | None
-    #: How the goal before this follow-up ended.
-    first_end: EffectFinished | None = None
+class _Pursuit:
+    """One goal of a request, and those begun beside it (ConfirmedCommand.otherwise): any is
+    enough. whose: the device, if the request has several goals."""
 
-    def end(self) -> EffectLoop[Any] | None:
-        """The loop that tells how the request ended; None: it goes on."""
+    whose: str
+    loops: list[EffectLoop[Any]]
+
+    def finished(self) -> EffectFinished | None:
+        """How it ended; None: it goes on."""
+        end = self._end()
+        if end is None or end.finished is None:
+            return None
+        if len(self.loops) == 1:
+            return end.finished
+        others = [f"{loop.goal.name}: {loop.answer}" for loop in self.loops if loop is not end]
+        text = "; ".join([f"{end.goal.name}: {end.finished.message}", *others])
+        return replace(end.finished, message=text)
+
+    def _end(self) -> EffectLoop[Any] | None:
+        """The loop that tells how it ended; None: it goes on."""
         shown = [loop for loop in self.loops if loop.finished and loop.finished.success]
         if shown:
             # Where two ways show the same effect, the one that was accepted brought it about, or
@@ -86,13 +96,38 @@ class _Running:
         all_ended = all(loop.ended for loop in self.loops)
         return self.loops[-1] if all_ended else None
 
-    def text(self, end: EffectLoop[Any]) -> str:
-        """What came of the request: of the way that tells it, and of those beside it."""
-        assert end.finished is not None
-        if len(self.loops) == 1:
-            return end.finished.message
-        others = [f"{loop.goal.name}: {loop.answer}" for loop in self.loops if loop is not end]
-        return "; ".join([f"{end.goal.name}: {end.finished.message}", *others])
+
+@dataclass(frozen=True)
+class _Running:
+    #: Side by side: all must be reached.
+    pursuits: list[_Pursuit]
+    watch: Watch | None = None
+    follow_up: tuple[ConfirmedCommand[Any], Watch] | None = None
+    #: How the goal before this follow-up ended.
+    first_end: EffectFinished | None = None
+
+    @property
+    def loops(self) -> list[EffectLoop[Any]]:
+        """Those of all goals."""
+        return [loop for pursuit in self.pursuits for loop in pursuit.loops]
+
+    def finished(self) -> EffectFinished | None:
+        """How the request ended; None: it goes on. What was not reached is named first."""
+        ends = [(pursuit.whose, pursuit.finished()) for pursuit in self.pursuits]
+        told = [(whose, end) for whose, end in ends if end is not None]
+        if len(told) < len(ends):
+            return None
+        told.sort(key=lambda one: one[1].success)
+        _, first = told[0]
+        if len(told) == 1:
+            return first
+        return replace(
+            first,
+            accepted=all(end.accepted for _, end in told),
+            message="; ".join(f"{whose}: {end.message}" for whose, end in told),
+            sent=any(end.sent for _, end in told),
+            shown=all(end.shown for _, end in told),
+        )
 
 
 class Requests(EventLog, Generic[TransactionsT]):
@@ -129,7 +164,16 @@ class Requests(EventLog, Generic[TransactionsT]):
     ) -> None:
         """Go for goal. watch: the message to hand over at the end. follow_up: what to ask after
         success; it adds its message to the answer, but cannot turn success into failure."""
-        self._running[token] = _Running([self._loop(token, goal, now)], watch, follow_up)
+        pursuit = self._pursuit(token, "", goal, now)
+        self._running[token] = _Running([pursuit], watch, follow_up)
+
+    def begin_all(
+        self, token: int, goals: Mapping[str, ConfirmedCommand[Any]], now: float
+    ) -> None:
+        """Go for all these goals, by the names of their devices; all must be reached."""
+        self._running[token] = _Running(
+            [self._pursuit(token, whose, goal, now) for whose, goal in goals.items()]
+        )
 
     def abandon(self, token: int, why: str, now: float) -> None:
         """End a request, if it is under way; nothing more is sent for it."""
@@ -153,6 +197,12 @@ class Requests(EventLog, Generic[TransactionsT]):
         for token in found:
             self.abandon(token, why, now)
         return bool(found)
+
+    def in_progress(self, number: int, words: str) -> None:
+        """A device said that it is still at the command with this number."""
+        loop = self._owners.get(number)
+        if loop is not None:
+            loop.in_progress(words)
 
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""
@@ -186,27 +236,30 @@ class Requests(EventLog, Generic[TransactionsT]):
         moved = True
         while moved:
             moved = False
-            for finished in self.commands.take_finished():
-                loop = self._owners.pop(finished.token, None)
-                if loop is not None and finished.command == loop.goal.commands[-1]:
-                    loop.command_finished(finished, now)
+            for answer in self.commands.take_finished():
+                loop = self._owners.pop(answer.token, None)
+                if loop is not None:
+                    loop.command_finished(answer, now)
             for token, running in self._running.items():
-                self._try_otherwise(token, running, now)
+                for pursuit in running.pursuits:
+                    self._try_otherwise(token, pursuit, now)
                 for loop in running.loops:
                     self._start_commands(loop, now)
             for out in self.commands.take_output():
                 loop = None if out.token is None else self._owners.get(out.token)
                 if loop is not None:
-                    loop.command_sent(out.command, now)
+                    loop.command_sent(now)
+                    send += self._prepared(out.command, now)
                 send.append(out)
                 moved = True
             for token, running in list(self._running.items()):
-                end = running.end()
-                self._tell_reports(running, end)
-                if end is not None and end.finished is not None:
-                    finished = replace(end.finished, message=running.text(end))
+                finished = running.finished()
+                self._tell_reports(token, running, finished)
+                if finished is not None:
                     self._close(token, running, finished, now)
                     moved = True
+            # What one of several goals has reached, or given up, is not sent again for the others.
+            moved |= self._cancel(lambda loop: loop.ended, now)
         return send
 
     def fail_untold(self, tokens: Collection[int], why: str) -> None:
@@ -226,13 +279,28 @@ class Requests(EventLog, Generic[TransactionsT]):
     def _loop(self, token: int, goal: ConfirmedCommand[Any], now: float) -> EffectLoop[Any]:
         return EffectLoop(token, goal, self._limits, now, self._number())
 
-    def _try_otherwise(self, token: int, running: _Running, now: float) -> None:
-        end, newest = running.end(), running.loops[-1]
-        done = end is not None and end.finished is not None and end.finished.success
-        if newest.hampered and not done:
+    def _pursuit(
+        self, token: int, whose: str, goal: ConfirmedCommand[Any], now: float
+    ) -> _Pursuit:
+        return _Pursuit(whose, [self._loop(token, goal, now)])
+
+    def _try_otherwise(self, token: int, pursuit: _Pursuit, now: float) -> None:
+        end, newest = pursuit.finished(), pursuit.loops[-1]
+        if newest.hampered and not (end is not None and end.success):
             goal = newest.goal.otherwise()
             if goal is not None:
-                running.loops.append(self._loop(token, goal, now))
+                pursuit.loops.append(self._loop(token, goal, now))
+
+    def _prepared(self, command: Any, now: float) -> list[Any]:
+        """What any goal under way wants to be sent right before this command."""
+        prepare: list[Any] = []
+        for loop in self._loops():
+            *before, last = loop.goal.commands
+            if last == command and not loop.ended:
+                prepare += [one for one in before if one not in prepare]
+        for one in prepare:
+            self.commands.send_once(one, now)
+        return self.commands.take_output() if prepare else []
 
     def _start_commands(self, loop: EffectLoop[Any], now: float) -> None:
         for command in loop.take_commands():
@@ -242,29 +310,35 @@ class Requests(EventLog, Generic[TransactionsT]):
         for command in loop.take_refreshes():
             self.commands.send_once(command, now)
 
-    def _tell_reports(self, running: _Running, end: EffectLoop[Any] | None) -> None:
-        """The steps of all ways; the end of one that is not the request's is none of them."""
+    def _tell_reports(
+        self, token: int, running: _Running, finished: EffectFinished | None
+    ) -> None:
+        """The steps of all ways, and one end; the end of one way alone is none."""
         for loop in running.loops:
             for report in loop.take_reports():
-                ends = report.outcome in (Outcome.CONFIRMED, Outcome.FAILED)
-                if ends and end is None:
-                    report = replace(report, outcome=Outcome.REFUSED)
-                elif ends and loop is not end:
-                    continue
-                elif ends:
-                    report = replace(report, detail=running.text(loop))
-                self._events.append(RequestReport(report))
+                if report.outcome is Outcome.FAILED and finished is None:
+                    self._events.append(RequestReport(replace(report, outcome=Outcome.REFUSED)))
+                elif report.outcome not in (Outcome.CONFIRMED, Outcome.FAILED):
+                    self._events.append(RequestReport(report))
+        if finished is not None:
+            outcome = Outcome.CONFIRMED if finished.success else Outcome.FAILED
+            self._events.append(RequestReport(Report(token, outcome, finished.message)))
+
+    def _cancel(self, which: Callable[[EffectLoop[Any]], bool], now: float) -> bool:
+        """What those loops do not need any more must not be sent again; whether there was any."""
+        numbers = [number for number, owner in self._owners.items() if which(owner)]
+        for number in numbers:
+            del self._owners[number]
+            self.commands.cancel(number, now)
+        return bool(numbers)
 
     def _close(self, token: int, running: _Running, finished: EffectFinished, now: float) -> None:
         del self._running[token]
-        for number in [n for n, owner in self._owners.items() if owner in running.loops]:
-            # What is not needed any more must not be sent again.
-            del self._owners[number]
-            self.commands.cancel(number, now)
+        self._cancel(lambda loop: loop in running.loops, now)
         if running.follow_up is not None and finished.success:
             goal, watch = running.follow_up
-            loop = self._loop(token, goal, now)
-            self._running[token] = _Running([loop], watch, None, first_end=finished)
+            pursuit = self._pursuit(token, "", goal, now)
+            self._running[token] = _Running([pursuit], watch, first_end=finished)
             return
         first = running.first_end
         if first is not None:

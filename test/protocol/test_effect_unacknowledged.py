@@ -55,7 +55,7 @@ class Bench:
         while self.waiting:
             self.waiting -= 1
             self.sent.append(self.now)
-            self.loop.command_sent("<S>", self.now)
+            self.loop.command_sent(self.now)
         return self._collect()
 
     def shows(self, there=True):
@@ -190,20 +190,6 @@ def test_one_that_is_not_wanted_any_more_says_whether_it_left(left):
     assert bench.loop.next_deadline() == math.inf
 
 
-def test_another_command_of_the_goal_is_not_the_one_that_counts():
-    goal = ConfirmedCommand(
-        "two", ("<A1>", "<A2>"), "x", lambda: True, unacknowledged=True, even_if_shown=True
-    )
-    loop = EffectLoop(1, goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
-    loop.command_sent("<A1>", 0.1)
-    loop.effect_may_show(0.1)
-    assert not loop.is_sent
-    assert not loop.ended
-    loop.command_sent("<A2>", 0.2)
-    loop.effect_may_show(0.3)
-    assert loop.finished.success
-
-
 def test_what_is_acknowledged_does_not_take_sent_for_it():
     loop = EffectLoop(
         1,
@@ -211,7 +197,7 @@ def test_what_is_acknowledged_does_not_take_sent_for_it():
         EffectLimits(1.5, 0.25, 5.0),
         0.0,
     )
-    loop.command_sent("<S>", 0.0)
+    loop.command_sent(0.0)
     assert loop.phase is Phase.WAIT_ACKNOWLEDGEMENT
     loop.abandon("y", 0.1)
     assert loop.finished.sent

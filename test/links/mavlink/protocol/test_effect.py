@@ -60,8 +60,8 @@ class Bench:
     def _collect(self):
         commands = self.loop.take_commands()
         self.sent += [self.now for _ in commands]
-        for command in commands:
-            self.loop.command_sent(command, self.now)
+        for _ in commands:
+            self.loop.command_sent(self.now)
         self.asked += [self.now for _ in self.loop.take_refreshes()]
         self.reports += [report.outcome for report in self.loop.take_reports()]
 

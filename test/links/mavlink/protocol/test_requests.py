@@ -131,6 +131,7 @@ GOALS = st.builds(
 )
 STEPS = st.one_of(
     st.tuples(st.just("begin"), GOALS),
+    st.tuples(st.just("begin all"), st.lists(GOALS, min_size=1, max_size=3)),
     st.tuples(st.just("ack"), st.sampled_from([ORDER, SET, ASK]), st.integers(0, 12)),
     st.tuples(st.just("release")),
     st.tuples(st.just("abandon")),
@@ -147,6 +148,9 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
         if step[0] == "begin":
             begun.append(len(begun) + 1)
             requests.begin(begun[-1], step[1], now)
+        elif step[0] == "begin all":
+            begun.append(len(begun) + 1)
+            requests.begin_all(begun[-1], {str(n): one for n, one in enumerate(step[1])}, now)
         elif step[0] == "ack":
             ack(requests, step[1], now, step[2])
         elif step[0] == "release":
@@ -163,6 +167,32 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
         ended += [end.finished.token for end in ends(requests)]
         assert now < 2000.0
     assert sorted(ended) == begun
+
+
+def test_what_prepares_a_goal_leaves_right_before_it_and_its_answer_ends_nothing():
+    requests, prepare = fresh(), Command(1, 161, 225)
+    requests.begin(5, ConfirmedCommand("release", (prepare, ORDER), "shown", urgent=True), 0.0)
+    requests.drive(0.0)
+    ack(requests, prepare, 0.1, results.DENIED)
+    ack(requests, prepare, 0.1)
+    assert ends(requests) == []
+    requests.update(0.2)
+    assert [send.command for send in requests.drive(0.2)] == [prepare, ORDER]
+
+
+def test_goals_side_by_side_end_together_and_one_that_fails_is_named_first():
+    requests, other = fresh(), Command(1, 162, 208)
+    requests.begin_all(5, {"a": goal(), "b": goal(command=other)}, 0.0)
+    assert [send.command for send in requests.drive(0.0)] == [ORDER, other]
+    ack(requests, ORDER, 0.1)
+    assert ends(requests) == []
+    requests.commands.acknowledged(Acknowledgement(1, 162, 208, results.DENIED), 0.2)
+    requests.drive(0.2)
+    (end,) = ends(requests)
+    assert (end.finished.success, end.finished.result) == (False, results.DENIED)
+    assert end.finished.message.startswith("b: release denied")
+    assert end.finished.message.endswith("; a: release acknowledged after 0.10 s")
+    assert requests.next_deadline() == math.inf
 
 
 def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
