@@ -19,6 +19,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros import model
 from chute_ros.links.mavlink.diagnostics import Details, details_of, link_task, tasks
 from chute_ros.links.mavlink.parameters import PARAMETERS, MavlinkParameters
+from chute_ros.links.mavlink.protocol.goals import impossible_masks
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.links.mavlink.runtime import MavlinkRuntime
@@ -104,11 +105,7 @@ class MavlinkParachuteNode(DeviceNode):
     # -- services -------------------------------------------------------------------------------
 
     async def _set_triggers(self, request: Any, response: Any) -> Any:
-        if not 1 <= request.select <= 255 or request.arm > 255:
-            why = (
-                f"arm {request.arm}, select {request.select}: arm is a mask from 0 to 255, "
-                "select from 1 to 255 (ParachuteStatus.TRIGGER_*); nothing was sent"
-            )
+        if why := impossible_masks(request.arm, request.select):
             return _denied(response, why)
         end = await self.request(
             lambda link, token, now: link.set_triggers(

@@ -9,6 +9,7 @@ import math
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
+from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
@@ -138,11 +139,21 @@ class Devices(EventLog):
         """How often an autopilot of ours was seen to arm."""
         return sum(autopilot.arming_count for autopilot in self.autopilots.all())
 
-    def accepted(self, ack: Acknowledgement, now: float) -> None:
-        """A device accepted a command of ours."""
-        autopilot = self.autopilots.get(ack.system_id, ack.component_id)
-        if autopilot is not None:
+    def to_arm(self) -> list[ParachuteTracker]:
+        """Where an arming without a device goes: all that are not lost, or else the first."""
+        known = self.parachutes.all()
+        alive = [one for one in known if one.liveness.state is not LinkState.LOST]
+        return alive or known[:1]
+
+    def answered(self, ack: Acknowledgement, now: float) -> None:
+        """A device answered a command of ours."""
+        ids = (ack.system_id, ack.component_id)
+        autopilot = self.autopilots.get(*ids)
+        if autopilot is not None and ack.result == results.ACCEPTED:
             autopilot.motor_signs.accepted(ack.number, now)
+        parachute = self.parachutes.get(*ids) or self._unproven.get(ids)
+        if parachute is not None and ack.number == dialect.MAV_CMD_SET_PARACHUTE_ARM:
+            parachute.arming_answered(ack.result, now)
 
     def motors_remark(self) -> str:
         """What whoever releases a parachute must know of the motors; empty: nothing."""
@@ -177,12 +188,13 @@ class Devices(EventLog):
 
     # -- what they say ---------------------------------------------------------------------------
 
-    def heard(self, message: Any, ids: Ids, now: float, copy: bool = False) -> None:
-        """A message of anybody on the network. copy: of a heartbeat that came before."""
+    def heard(self, message: Any, ids: Ids, now: float, copy: bool = False) -> bool:
+        """A message of anybody on the network; whether it shows that a device of ours restarted.
+        copy: of a heartbeat that came before."""
         if message.get_type() != "HEARTBEAT":
-            self._from_parachute(message, ids, now)
-            self._from_autopilot(message, ids, now)
-        elif message.type == dialect.MAV_TYPE_PARACHUTE:
+            restarted = self._from_parachute(message, ids, now)
+            return self._from_autopilot(message, ids, now) or restarted
+        if message.type == dialect.MAV_TYPE_PARACHUTE:
             self._parachute_heartbeat(message, ids, now)
         else:
             self._unproven.pop(ids, None)
@@ -190,6 +202,7 @@ class Devices(EventLog):
                 self._others.add(ids)
             if is_autopilot(message):
                 self._autopilot_heartbeat(message, ids, now, copy)
+        return False
 
     def update(self, now: float) -> None:
         """Look at the clock."""
@@ -243,20 +256,21 @@ class Devices(EventLog):
         self.link_changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now, copy))
         self._vehicle_changed(now)
 
-    def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
+    def _from_parachute(self, message: Any, ids: Ids, now: float) -> bool:
         parachute, kind = self.parachutes.get(*ids), message.get_type()
         if parachute is None:
             if kind == "PARACHUTE_STATUS":
                 self._unproven_status(message, ids, now)
-            return
+            return False
+        reboots = parachute.reboot_count
         if kind == "PARACHUTE_STATUS":
-            reboots = parachute.reboot_count
             parachute.parachute_status(message, now)
             if parachute.reboot_count > reboots:
                 self.notice(Severity.ERROR, f"parachute {parachute.device} restarted")
             self._events.append(ParachuteChanged(parachute.status(now), parachute.received))
         elif kind == "COMPONENT_INFORMATION_BASIC":
             parachute.component_information(message)
+        return parachute.reboot_count > reboots
 
     def _unproven_status(self, message: Any, ids: Ids, now: float) -> None:
         if ids in self._others or not self.parachutes.fits(*ids):
@@ -266,10 +280,10 @@ class Devices(EventLog):
         if ids in self._unproven:
             self._unproven[ids].parachute_status(message, now)
 
-    def _from_autopilot(self, message: Any, ids: Ids, now: float) -> None:
+    def _from_autopilot(self, message: Any, ids: Ids, now: float) -> bool:
         autopilot = self.autopilots.get(*ids)
         if autopilot is None:
-            return
+            return False
         reboots = autopilot.reboot_count
         changed = autopilot.message(message, now)
         if autopilot.reboot_count > reboots:
@@ -277,6 +291,7 @@ class Devices(EventLog):
             self.notice(Severity.ERROR, f"autopilot {autopilot.device} restarted {where}")
         if changed:
             self._vehicle_changed(now)
+        return autopilot.reboot_count > reboots
 
     def _vehicle_changed(self, now: float) -> None:
         self._events.append(VehicleChanged(self.vehicle_state(now)))

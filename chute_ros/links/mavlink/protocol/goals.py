@@ -7,6 +7,7 @@ MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -23,8 +24,8 @@ from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 MavlinkGoal = ConfirmedCommand[Command]
 Device = ParachuteTracker | AutopilotTracker
 
-#: Whole numbers up to here are exact in a param, which is a 32-bit float.
-MOST_EXACT = 2**24
+#: Each bit of a trigger mask that a PARACHUTE_STATUS can show.
+_ALL_TRIGGERS = 0xFF
 
 #: Name of the goal that fires.
 RELEASE = "release"
@@ -57,10 +58,29 @@ def request_status(parachute: ParachuteTracker) -> Command:
     return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
 
 
+def impossible_masks(arm: int, select: int) -> str:
+    """Why these trigger masks cannot be set; empty: they can."""
+    if 0 <= arm <= _ALL_TRIGGERS and 0 < select <= _ALL_TRIGGERS:
+        return ""
+    return (
+        f"arm {arm}, select {select}: arm is a mask from 0 to {_ALL_TRIGGERS}, select from 1 to "
+        f"{_ALL_TRIGGERS} (ParachuteStatus.TRIGGER_*); nothing was sent"
+    )
+
+
 def set_triggers(
-    parachute: ParachuteTracker, arm: TriggerFlags, select: TriggerFlags, now: float
+    parachute: ParachuteTracker,
+    arm: TriggerFlags,
+    select: TriggerFlags,
+    now: float,
+    remark: str = "",
 ) -> MavlinkGoal:
-    """Arm the selected trigger sources that are set in arm, disarm the other selected ones."""
+    """Arm the selected trigger sources that are set in arm, disarm the other selected ones.
+    remark: what else whoever reads its end must know.
+
+    A module may refuse a mask with a source that it does not have. Where all are disarmed each is
+    disarmed by itself then; a half of what is to be armed is not.
+    """
 
     def shown() -> bool:
         fresh = parachute.status_received > now
@@ -71,20 +91,40 @@ def set_triggers(
         [f"{name} armed" for name in flag_names(select & arm)]
         + [f"{name} disarmed" for name in flag_names(disarmed)]
     )
-    return ConfirmedCommand(
-        "MAV_CMD_SET_PARACHUTE_ARM",
-        (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, arm, select),),
-        f"PARACHUTE_STATUS reports {changed}",
-        shown,
-        request_status(parachute),
-        hinders_release=bool(disarmed),
-    )
+    singles = [one for one in TriggerFlags if one & select and one != select]
+
+    def hint() -> str:
+        if not singles or not parachute.arming_refusal(now):
+            return ""
+        names = ", ".join(flag_names(select))
+        return (
+            f"it may lack one of {names}: choose those that it has by triggers, or by "
+            "default_triggers"
+        )
+
+    def way(masks: list[TriggerFlags]) -> MavlinkGoal:
+        mask, *others = masks
+        alone = "" if mask == select else f" ({', '.join(flag_names(mask))} alone)"
+        return ConfirmedCommand(
+            f"MAV_CMD_SET_PARACHUTE_ARM{alone}",
+            (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, arm, mask),),
+            f"PARACHUTE_STATUS reports {changed}",
+            shown,
+            request_status(parachute),
+            hinders_release=bool(disarmed),
+            hint=hint,
+            remark=lambda: remark,
+            otherwise=lambda: way(others) if others and parachute.arming_refusal(now) else None,
+        )
+
+    return way([select] if arm & select else [select, *singles])
 
 
 def release(
     parachute: ParachuteTracker, force: bool, now: float, remark: Callable[[], str] = str
 ) -> MavlinkGoal:
-    """Release the parachute; with force its flight-controller trigger is armed on the way.
+    """Release the parachute; with force its triggers for commands are armed on the way, each by
+    itself: a module may refuse a mask with a source that it does not have.
     remark: what else whoever reads its end must know.
 
     A status from before the order is believed only while the status stream is alive and the device
@@ -95,29 +135,31 @@ def release(
     def shown() -> bool:
         return parachute.deployed and (alive or parachute.status_received > now)
 
-    commands: tuple[Command, ...] = (
-        command(parachute, dialect.MAV_CMD_DO_PARACHUTE, dialect.PARACHUTE_RELEASE),
-    )
-    if force:
-        sources = TriggerFlags.FC | TriggerFlags.OFFBOARD
-        arm = command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, sources, sources)
-        commands = (arm, *commands)
+    order = command(parachute, dialect.MAV_CMD_DO_PARACHUTE, dialect.PARACHUTE_RELEASE)
+    arm = [
+        command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, source, source)
+        for source in (TriggerFlags.FC, TriggerFlags.OFFBOARD)
+        if force
+    ]
     return ConfirmedCommand(
         RELEASE,
-        commands,
+        (*arm, order),
         "PARACHUTE_STATUS reports deployed",
         shown,
         request_status(parachute),
         insist=force,
         urgent=True,
-        hint=lambda: _why_not_released(parachute),
+        hint=lambda: _why_not_released(parachute, now if force else math.inf),
         remark=remark,
     )
 
 
-def _why_not_released(parachute: ParachuteTracker) -> str:
-    """What of the device's own status keeps a module from releasing on command."""
+def _why_not_released(parachute: ParachuteTracker, armed_since: float) -> str:
+    """What of the device's own words keeps a module from releasing on command. armed_since: when
+    arming on the way began."""
     hints = []
+    if refusal := parachute.arming_refusal(armed_since):
+        hints.append(f"arming FC or OFFBOARD on the way: {refusal}")
     if not parachute.armed_triggers & TriggerFlags.FC:
         armed = ", ".join(flag_names(parachute.armed_triggers)) or "none"
         # Some modules go by FC alone, wherever the command comes from.

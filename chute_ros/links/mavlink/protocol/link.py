@@ -12,7 +12,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import Any
 
-from chute_ros.links.mavlink.protocol import goals, results
+from chute_ros.links.mavlink.protocol import goals
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
@@ -110,21 +110,21 @@ class MavlinkLink:
 
     def set_triggers(self, token: int, arm: int, select: int, device: str, now: float) -> None:
         """Arm and disarm single trigger sources (masks of TriggerFlags)."""
-        if not 0 <= arm < goals.MOST_EXACT or not 0 < select < goals.MOST_EXACT:
-            why = f"trigger masks arm {arm}, select {select}: a parameter holds 24 bits"
-            self.requests.refuse(token, f"{why}, and one must be selected; nothing was sent")
-            return
-        if select & ~arm and self._release_under_way(token):
-            return
-        parachute = self._target(token, device)
-        if parachute is not None:
-            goal = goals.set_triggers(parachute, TriggerFlags(arm), TriggerFlags(select), now)
-            self._begin(token, goal, now)
+        if self._may_set(token, arm, select):
+            parachute = self._target(token, device)
+            if parachute is not None:
+                self._set_triggers(token, arm, select, [parachute], now)
 
     def arm(self, token: int, arm: bool, triggers: int, now: float) -> None:
-        """Arm or disarm the chosen parachute's triggers (0: the default ones)."""
+        """Arm or disarm the triggers (0: the default ones) of every parachute that is not lost,
+        or, if all are, of the first."""
         select = triggers or int(self.config.default_triggers)
-        self.set_triggers(token, select if arm else 0, select, "", now)
+        mask = select if arm else 0
+        if self._may_set(token, mask, select) and self._target(token, "") is not None:
+            targets, known = self._devices.to_arm(), self.parachutes.all()
+            lost = ", ".join(one.device for one in known if one not in targets)
+            remark = f"LOST, and nothing was sent to it: {lost}" if lost else ""
+            self._set_triggers(token, mask, select, targets, now, remark)
 
     def announce(self, text: str) -> None:
         """Have the ground station read this."""
@@ -290,12 +290,35 @@ class MavlinkLink:
                 frame.system_id, frame.component_id, message.command, message.result
             )
             self.requests.commands.acknowledged(ack, now)
-            if ack.result == results.ACCEPTED:
-                self._devices.accepted(ack, now)
+            self._devices.answered(ack, now)
 
     def _release_allowed(self) -> bool:
         """In this flight: one begins as the autopilot is armed."""
         return self._deploy_decided_in == self._devices.arming_count()
+
+    def _may_set(self, token: int, arm: int, select: int) -> bool:
+        """These triggers may be set; False: the request is refused."""
+        if why := goals.impossible_masks(arm, select):
+            self.requests.refuse(token, why)
+            return False
+        return not (select & ~arm and self._release_under_way(token))
+
+    def _set_triggers(
+        self,
+        token: int,
+        arm: int,
+        select: int,
+        targets: list[ParachuteTracker],
+        now: float,
+        remark: str = "",
+    ) -> None:
+        masks = (TriggerFlags(arm), TriggerFlags(select))
+        ways = {
+            one.device: goals.set_triggers(one, *masks, now, remark if one is targets[-1] else "")
+            for one in targets
+        }
+        self.requests.begin_all(token, ways, now)
+        self._drive(now)
 
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""

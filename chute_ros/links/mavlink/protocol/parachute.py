@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.twins import Twins
 from chute_ros.model import (
     TRIGGER_SOURCES,
@@ -129,6 +130,8 @@ class ParachuteTracker(DeviceTracker):
         #: A status came that may be the first after a restart, or a delayed one from before.
         self._doubtful = False
         self._asked = -math.inf
+        #: Of an arming or disarming: the newest refusal, and when it came.
+        self._arming_refusal, self._arming_refused_at = "", -math.inf
 
     @property
     def device(self) -> str:
@@ -151,6 +154,15 @@ class ParachuteTracker(DeviceTracker):
     def armed_triggers(self) -> TriggerFlags:
         """The trigger sources that are armed by the newest status."""
         return TriggerFlags(self._message.arm_status if self._message is not None else 0)
+
+    def arming_answered(self, result: int, now: float) -> None:
+        """It answered MAV_CMD_SET_PARACHUTE_ARM."""
+        if result not in (results.ACCEPTED, results.IN_PROGRESS):
+            self._arming_refusal, self._arming_refused_at = results.result_text(result), now
+
+    def arming_refusal(self, since: float) -> str:
+        """Its newest refusal to arm or to disarm since then, in words; empty: there was none."""
+        return self._arming_refusal if self._arming_refused_at >= since else ""
 
     def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
         """A HEARTBEAT of the device."""

@@ -5,6 +5,7 @@ from link_bench import Bench, ack, copter, heartbeat, status
 
 from chute_ros.links.mavlink.protocol import results
 from chute_ros.protocol.events import RequestReport
+from chute_ros.protocol.goal import EffectLimits
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 CHUTE, PILOT = (1, 161), (1, 1)
@@ -63,11 +64,193 @@ def test_release_without_ground_clearance_goes_on_until_it_is_accepted():
     assert bench.end(1).finished.success
 
 
-def test_release_with_force_arms_the_trigger_on_the_way():
+def test_release_with_force_arms_each_trigger_on_the_way_and_waits_for_none():
     bench = ready().call("deploy", 1, True)
-    arm, order = bench.commands()
-    assert (arm.command, arm.param1, arm.param2) == (TRIGGERS, 12, 12)
+    assert {t for t, _ in bench.sent} == {0.5}
+    fc, offboard, order = bench.commands()
+    assert (fc.command, fc.param1, fc.param2) == (TRIGGERS, 4, 4)
+    assert (offboard.command, offboard.param1, offboard.param2) == (TRIGGERS, 8, 8)
     assert (order.command, order.param1) == (RELEASE, 2)
+
+
+def test_release_with_force_arms_again_each_time_that_it_is_sent():
+    """A burst that loses the first of both would else cost a whole try."""
+    bench = ready().call("deploy", 1, True).at(0.75)
+    again = [(order.command, order.param1) for t, order in bench.sent if t == pytest.approx(0.7)]
+    assert again == [(TRIGGERS, 4), (TRIGGERS, 8), (RELEASE, 2)]
+    # And one without force that joins it takes nothing from it.
+    bench = ready().call("deploy", 1, True).at(0.55).call("deploy", 2, False).clear().at(0.8)
+    assert [order.command for order in bench.commands()] == [TRIGGERS, TRIGGERS, RELEASE]
+
+
+class Module:
+    """A parachute with some trigger sources, which denies a mask with any other."""
+
+    def __init__(self, bench, ids=CHUTE, has=0xFF, armed=0):
+        self.bench, self.ids, self.has, self.armed = bench, ids, has, armed
+        self.deployed = self.boot = self.seen = 0
+        self.beat = 0.0
+
+    def live(self, until, others=()):
+        """Answer what is sent, each 10 ms, and what the others are sent."""
+        while self.bench.t < until:
+            self.bench.at(self.bench.t + 0.01)
+            for one in (self, *others):
+                one.turn()
+        return self.bench
+
+    def turn(self):
+        fresh, self.seen = self.bench.sent[self.seen :], len(self.bench.sent)
+        if self.bench.t >= self.beat + 1.0:
+            self.beat = self.bench.t
+            self.bench.hear(self.ids, heartbeat())
+        for _, order in fresh:
+            if order.get_type() == "COMMAND_LONG" and self._is_meant(order):
+                self._obey(order)
+
+    def _is_meant(self, order):
+        return (order.target_system, order.target_component) == self.ids
+
+    def _obey(self, order):
+        if order.command == TRIGGERS:
+            arm, select = int(order.param1), int(order.param2)
+            allowed = not select & ~self.has
+            if allowed:
+                self.armed = self.armed & ~select | arm & select
+            self._answer(order, allowed, d.MAV_RESULT_DENIED)
+        elif order.command == RELEASE:
+            self.deployed = self.deployed or (3 if self.armed & 12 else 0)
+            self._answer(order, self.deployed, d.MAV_RESULT_FAILED)
+        elif order.command == REQUEST:
+            self._answer(order, True, None)
+            self.boot = round(self.bench.t * 1000)
+            told = status(boot_ms=self.boot + 5000, armed=self.armed, deployed=self.deployed)
+            self.bench.hear(self.ids, told)
+
+    def _answer(self, order, allowed, otherwise):
+        result = d.MAV_RESULT_ACCEPTED if allowed else otherwise
+        self.bench.hear(self.ids, ack(order.command, result))
+
+
+def started(*ids, **config):
+    bench = Bench(**config)
+    for one in ids or (CHUTE,):
+        bench.hear(one, heartbeat(), status(boot_ms=4000))
+    return bench
+
+
+@pytest.mark.parametrize("has", [4, 8], ids=["FC alone", "OFFBOARD alone"])
+def test_a_module_that_lacks_a_source_is_released_by_force_as_fast_as_any(has):
+    bench = started()
+    module = Module(bench, has=has)
+    bench.at(0.5).call("deploy", 1, True)
+    end = module.live(1.0).end(1).finished
+    assert (end.success, end.accepted) == (True, True)
+    assert "after 0.01 s" in end.message
+
+
+def test_a_refusal_to_arm_on_the_way_is_told_when_the_release_fails():
+    bench = started()
+    module = Module(bench, has=0)
+    bench.at(0.5).call("deploy", 1, True)
+    end = module.live(6.0).end(1).finished
+    assert not end.success
+    assert "arming FC or OFFBOARD on the way: denied" in end.message
+    # But no earlier one's.
+    bench = started(effect=EffectLimits(give_up_after=0.5))
+    module = Module(bench, has=0)
+    bench.at(0.5).call("arm", 1, True, 0)
+    module.live(1.0)
+    bench.call("deploy", 2, False)
+    assert "on the way: denied" not in module.live(2.0).end(2).finished.message
+
+
+def test_an_arming_that_is_refused_arms_no_half_and_names_the_choice():
+    bench = started()
+    module = Module(bench, has=4)
+    bench.at(0.5).call("arm", 1, True, 0)
+    end = module.live(1.0).end(1).finished
+    assert not end.success
+    assert "denied" in end.message
+    text = "it may lack one of FC, OFFBOARD: choose those that it has by triggers, or by "
+    assert text + "default_triggers" in end.message
+    assert module.armed == 0
+
+
+@pytest.mark.parametrize("has", [4, 8], ids=["FC alone", "OFFBOARD alone"])
+def test_a_module_that_lacks_a_source_is_disarmed_all_the_same(has):
+    bench = started()
+    module = Module(bench, has=has, armed=has)
+    bench.at(0.5).call("arm", 1, False, 0)
+    assert module.live(1.0).end(1).finished.success
+    assert module.armed == 0
+
+
+SECOND, THIRD = (1, 162), (1, 163)
+
+
+@pytest.mark.parametrize("arm", [True, False])
+def test_arming_without_a_device_goes_to_every_parachute(arm):
+    bench = started(CHUTE, SECOND)
+    first, second = (Module(bench, ids, armed=0 if arm else 12) for ids in (CHUTE, SECOND))
+    bench.at(0.5).call("arm", 1, arm, 0)
+    end = first.live(1.0, [second]).end(1).finished
+    assert (end.success, end.accepted, end.shown) == (True, True, True)
+    assert (first.armed, second.armed) == ((12, 12) if arm else (0, 0))
+    assert "1/161: PARACHUTE_STATUS reports FC" in end.message
+    assert "1/162: PARACHUTE_STATUS reports FC" in end.message
+    assert steps(bench, 1).count("CONFIRMED") == 1
+
+
+def test_arming_fails_if_one_parachute_refuses_and_names_it_first():
+    bench = started(CHUTE, SECOND)
+    first, second = Module(bench, CHUTE), Module(bench, SECOND, has=4)
+    bench.at(0.5).call("arm", 1, True, 0)
+    end = first.live(1.0, [second]).end(1).finished
+    assert (end.success, end.result) == (False, d.MAV_RESULT_DENIED)
+    assert end.message.startswith("1/162: MAV_CMD_SET_PARACHUTE_ARM denied")
+    assert "; 1/161: PARACHUTE_STATUS reports FC armed, OFFBOARD armed" in end.message
+    assert steps(bench, 1)[-1] == "FAILED"
+    assert "CONFIRMED" not in steps(bench, 1)
+
+
+def test_arming_fails_in_time_if_one_parachute_is_silent_and_the_other_is_sent_no_more():
+    bench = started(CHUTE, SECOND)
+    first = Module(bench, CHUTE)
+    bench.at(0.5).call("arm", 1, False, 0)
+    end = first.live(6.0).end(1).finished
+    assert not end.success
+    assert "1/162: MAV_CMD_SET_PARACHUTE_ARM given up after 5.0 s" in end.message
+    to_first = [one for one in bench.commands(TRIGGERS) if one.target_component == 161]
+    assert len(to_first) == 1
+
+
+def test_what_shows_without_its_answer_is_not_sent_again_for_the_sake_of_another():
+    bench = started(CHUTE, SECOND).at(0.5).call("arm", 1, False, 0)
+    bench.at(0.55).hear(CHUTE, status(boot_ms=5000)).clear().at(2.0)
+    assert {order.target_component for order in bench.commands(TRIGGERS)} == {162}
+
+
+def test_a_lost_parachute_is_not_waited_for_and_is_named():
+    bench = started(CHUTE, SECOND)
+    first = Module(bench, CHUTE, armed=12)
+    first.live(6.0).call("arm", 1, False, 0)
+    end = first.live(6.5).end(1).finished
+    assert end.success
+    assert end.message.endswith("; LOST, and nothing was sent to it: 1/162")
+    # Where all are lost, to the first.
+    bench = started(CHUTE, SECOND).at(6.0).call("arm", 1, False, 0)
+    (order,) = bench.commands(TRIGGERS)
+    assert order.target_component == 161
+    # Where there is none, to nobody.
+    bench = Bench().call("arm", 1, False, 0)
+    assert "no parachute was received on this link" in bench.end(1).finished.message
+
+
+def test_a_release_of_one_parachute_ends_the_disarming_of_all():
+    bench = started(CHUTE, SECOND).at(0.5).call("arm", 1, False, 0).call("deploy", 2, False)
+    assert "a release was ordered" in bench.end(1).finished.message
+    assert len(bench.clear().at(3.0).commands(TRIGGERS)) == 0
 
 
 def test_acknowledgement_by_or_to_another_component_is_not_ours():
