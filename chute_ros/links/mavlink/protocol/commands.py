@@ -1,7 +1,8 @@
 """COMMAND_LONG as a transaction: sent, resent, acknowledged or given up.
 
 Source: MAVLink developer guide, "Command protocol". Sent again with a rising confirmation until an
-acknowledgement comes from the component that was addressed; IN_PROGRESS extends the wait.
+acknowledgement comes from the component that was addressed; IN_PROGRESS extends the wait, that of
+an urgent command only a little: a device that restarts meanwhile has forgotten it.
 
 Which answer is to which send: see unanswered.py. A transaction that must tell its answers from
 those to N earlier sends may send N times more.
@@ -29,7 +30,12 @@ class CommandLimits(Settings):
         5, "a command is sent at most this many times", 1, 100, name="ack_tries"
     )
     in_progress_timeout: float = parameter(
-        5.0, "wait for the result after the answer IN_PROGRESS", 0.1, 600.0, "s"
+        5.0,
+        "wait for the result after the answer IN_PROGRESS; a release or a kill is sent again "
+        "after effect_timeout",
+        0.1,
+        600.0,
+        "s",
     )
     late_ack_window: float = parameter(
         5.0, "a late acknowledgement may still come within this time", 0.1, 60.0, "s"
@@ -114,7 +120,11 @@ class _Transaction:
     command: Command
     family: int
     started: float
+    urgent: bool
     deadline: float = math.inf
+    #: Of its newest send.
+    sent: float = math.nan
+    in_progress: bool = False
     #: Sends of others that may still be answered, and how often it may be sent itself.
     others: int = 0
     tries: int = 0
@@ -123,10 +133,14 @@ class _Transaction:
 
 
 class CommandTransactions:
-    """All commands of one link that are under way. One per component and command number."""
+    """All commands of one link that are under way. One per component and command number.
 
-    def __init__(self, limits: CommandLimits) -> None:
+    urgent_wait: an urgent one that is IN_PROGRESS is sent again so long after its newest send, s.
+    """
+
+    def __init__(self, limits: CommandLimits, urgent_wait: float = math.inf) -> None:
         self.limits = limits
+        self._urgent_wait = urgent_wait
         self.late_count = 0
         self.unexpected_count = 0
         self._open: dict[_Key, _Transaction] = {}
@@ -150,7 +164,7 @@ class CommandTransactions:
         once, or takes the place of any other; what waits is given up, lest it undo it.
         """
         key = _key(command)
-        new = _Transaction([token], command, token if family is None else family, now)
+        new = _Transaction([token], command, token if family is None else family, now, urgent)
         earlier = self._open.get(key)
         if earlier is not None and not urgent:
             self._waiting.setdefault(key, deque()).append(new)
@@ -159,6 +173,7 @@ class CommandTransactions:
             self._report(other, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
         if earlier is not None and earlier.command == command:
             earlier.tokens.append(token)
+            earlier.urgent = True
             earlier.tries = max(earlier.tries, earlier.sends + self.limits.tries)
             self._send(earlier, now)
             return
@@ -174,33 +189,40 @@ class CommandTransactions:
         if key in self._open:
             self._open[key].others += 1
 
-    def acknowledged(self, ack: Acknowledgement, now: float) -> None:
-        """An acknowledgement that is addressed to us came."""
+    def acknowledged(self, ack: Acknowledgement, now: float) -> list[int]:
+        """An acknowledgement that is addressed to us came. Returns whose command it says to be in
+        progress."""
         key = (ack.system_id, ack.component_id, ack.number)
         sends, transaction = self._sends.get(key), self._open.get(key)
         if sends is None:
             self.unexpected_count += 1
-            return
+            return []
         others = 0 if transaction is None else self._others_of(key, transaction, now)
         if ack.result == results.IN_PROGRESS:
             sends.in_progress(now, self.limits.in_progress_timeout)
             if transaction is None or others:
                 self.late_count += 1
-            else:
-                transaction.deadline = now + self.limits.in_progress_timeout
-            return
+                return []
+            self._extend(transaction, now)
+            return list(transaction.tokens)
         if not sends.answer(now):
             self.unexpected_count += 1
-            return
-        if transaction is None:
+        elif transaction is None:
             self.late_count += 1
-            return
-        transaction.answers[ack.result] += 1
-        if others and transaction.answers[ack.result] <= transaction.others:
-            self.late_count += 1
-            return
-        self._end(key, transaction, ack.result, now)
-        self._start_waiting(key, now)
+        else:
+            transaction.answers[ack.result] += 1
+            if others and transaction.answers[ack.result] <= transaction.others:
+                self.late_count += 1
+            else:
+                self._end(key, transaction, ack.result, now)
+                self._start_waiting(key, now)
+        return []
+
+    def restarted(self, system_id: int, component_id: int, now: float) -> None:
+        """This device restarted: what it was at is forgotten, and sent again at once."""
+        for (system, component, _), transaction in self._open.items():
+            if (system, component) == (system_id, component_id) and transaction.in_progress:
+                transaction.deadline = now
 
     def update(self, now: float) -> None:
         """Look at the clock: send again, or give up."""
@@ -262,7 +284,16 @@ class CommandTransactions:
         self._out.append(SendCommand(transaction.command, confirmation, token))
         self._sends_of(_key(transaction.command)).add(transaction.family, now)
         transaction.sends += 1
+        transaction.sent = now
         transaction.deadline = now + self.limits.ack_timeout
+
+    def _extend(self, transaction: _Transaction, now: float) -> None:
+        """It is in progress. An urgent one is not left to a device that may have forgotten it."""
+        until = now + self.limits.in_progress_timeout
+        if transaction.urgent:
+            # No sooner than it would be sent again without any answer.
+            until = max(transaction.deadline, min(until, transaction.sent + self._urgent_wait))
+        transaction.deadline, transaction.in_progress = until, True
 
     def _start_waiting(self, key: _Key, now: float) -> None:
         waiting = self._waiting.get(key)

@@ -46,7 +46,8 @@ class MavlinkLink:
         self._devices = Devices(config)
         self.parachutes = self._devices.parachutes
         self.autopilots = self._devices.autopilots
-        self.requests = Requests(CommandTransactions(config.commands), config.effect)
+        commands = CommandTransactions(config.commands, config.effect.effect_timeout)
+        self.requests = Requests(commands, config.effect)
         self._inbox = Inbox(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         window = config.commands.late_ack_window
@@ -275,7 +276,8 @@ class MavlinkLink:
             self._care.authorize(ids, now)
         else:
             copy = message.get_type() == "HEARTBEAT" and self._heartbeats.is_copy(frame, now)
-            self._devices.heard(message, ids, now, copy)
+            if self._devices.heard(message, ids, now, copy):
+                self.requests.commands.restarted(*ids, now)
         self.requests.effects_may_show(now)
 
     def _acknowledgement(self, frame: Frame, now: float) -> None:
@@ -289,7 +291,8 @@ class MavlinkLink:
             ack = Acknowledgement(
                 frame.system_id, frame.component_id, message.command, message.result
             )
-            self.requests.commands.acknowledged(ack, now)
+            for number in self.requests.commands.acknowledged(ack, now):
+                self.requests.in_progress(number, "IN_PROGRESS was the last answer")
             self._devices.answered(ack, now)
 
     def _release_allowed(self) -> bool:

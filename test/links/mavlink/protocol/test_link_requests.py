@@ -435,3 +435,43 @@ def test_a_refused_release_names_what_the_parachute_says_of_itself():
     message = refused(d.MAV_RESULT_DENIED, armed=4, safety=1)
     assert "armed triggers" not in message
     assert "GROUND_CLEARED" not in message
+
+
+PROGRESS = d.MAV_RESULT_IN_PROGRESS
+
+
+@pytest.mark.parametrize(("force", "number"), [(False, RELEASE), (None, DISARM)])
+def test_a_device_that_is_at_it_is_not_waited_for_longer_than_for_an_effect(force, number):
+    """It may have forgotten it: a release, and a kill, is sent again."""
+    bench, ids = ready(), PILOT if force is None else CHUTE
+    bench = bench.call("kill", 1) if force is None else bench.call("deploy", 1, force)
+    bench.at(0.6).hear(ids, ack(number, PROGRESS)).clear().at(1.9)
+    assert bench.commands(number) == []
+    assert len(bench.at(2.05).commands(number)) == 1
+    # Though it goes on to say so.
+    bench.stream(5.4, 0.1, ids, lambda: ack(number, PROGRESS))
+    assert len(bench.commands(number)) == 3
+    message = bench.at(6.0).end(1).finished.message
+    assert "given up after 5.0 s: IN_PROGRESS was the last answer, and the device's" in message
+
+
+def test_that_it_was_at_it_is_told_when_nothing_more_came():
+    bench = ready().call("deploy", 1, False).at(0.6).hear(CHUTE, ack(RELEASE, PROGRESS))
+    message = bench.at(6.0).end(1).finished.message
+    text = "no acknowledgement after 5 sends in 1.00 s; IN_PROGRESS was the last answer"
+    assert f"given up after 5.0 s: {text}" in message
+
+
+def test_an_order_that_a_restart_has_made_a_device_forget_is_sent_again_at_once():
+    bench = ready().call("deploy", 1, False).at(0.6).hear(CHUTE, ack(RELEASE, PROGRESS))
+    bench.clear().at(1.0).hear(CHUTE, status(boot_ms=100)).at(1.1)
+    bench.hear(CHUTE, status(boot_ms=200))
+    assert "parachute 1/161 restarted" in bench.notices()
+    assert [t for t, one in bench.sent if getattr(one, "command", 0) == RELEASE] == [1.1]
+
+
+def test_what_is_not_urgent_is_left_in_progress_for_longer():
+    bench = ready().call("parachute_action", 1, 1, "").at(0.6).hear(CHUTE, ack(RELEASE, PROGRESS))
+    assert bench.clear().at(4.9).commands(RELEASE) == []
+    bench.hear(CHUTE, ack(RELEASE))
+    assert bench.end(1).finished.success
