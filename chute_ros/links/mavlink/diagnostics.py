@@ -92,8 +92,9 @@ def _parachute(one: ParachuteTracker, now: float) -> Task:
         "packed date": status.packed_date,
         "uptime (s)": status.uptime,
     }
-    level = diagnostics.OK if status.healthy else diagnostics.ERROR
-    text = "; ".join(status.faults) or status.state.name
+    faults = [text for text in (*status.faults, one.deaf(now)) if text]
+    level = diagnostics.OK if status.healthy and not faults else diagnostics.ERROR
+    text = "; ".join(faults) or status.state.name
     text = f"released; {text}" if status.deployed else text
     return f"parachute {status.device}", level, text, values, status.device
 

@@ -63,8 +63,10 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         vehicle = link.vehicle_state(now)
-        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
-        doubts = [] if vehicle.armed is Armed.ARMED else link.doubts(now)
+        # Doubt about which devices are ours, and one that does not hear us, forbid take-off, but
+        # take nothing back in flight.
+        on_ground = vehicle.armed is not Armed.ARMED
+        doubts = link.doubts(now) if on_ground else []
         autopilot = _why_no_kill(vehicle)
         if not self.settings.expect_parachute:
             reasons = [*autopilot, *doubts]
@@ -74,6 +76,7 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         if chosen is not None:
             state, age = chosen.liveness.state, chosen.liveness.age(now)
             reasons = _why_unhealthy(chosen, now)
+            reasons += link.deaf_parachutes(now) if on_ground else []
         reasons += doubts
         if reasons:
             reasons += autopilot

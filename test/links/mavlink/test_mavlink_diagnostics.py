@@ -23,7 +23,10 @@ from chute_ros.protocol.liveness import Liveness, LivenessLimits
 def test_a_released_parachute_is_told_before_its_state(fields: dict[str, Any], text: str) -> None:
     status = ParachuteStatus("1/161", LinkState.OK, **({"state": ParachuteState.UNKNOWN} | fields))
     tracker = SimpleNamespace(
-        status=lambda now: status, liveness=Liveness(LivenessLimits()), status_interval=0.1
+        status=lambda now: status,
+        liveness=Liveness(LivenessLimits()),
+        status_interval=0.1,
+        deaf=lambda now: "",
     )
     name, _, told, _, device = _parachute(cast(Any, tracker), 5.0)
     assert (name, told, device) == ("parachute 1/161", text, "1/161")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from chute_ros.links.mavlink.protocol.answers import Answers
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
-from chute_ros.links.mavlink.protocol.firmware import firmware_of, shows_vtol
+from chute_ros.links.mavlink.protocol.firmware import Firmware, firmware_of, shows_vtol
 from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
@@ -103,6 +104,7 @@ class AutopilotTracker:
         self.settings = AutopilotSettings()
         self.motor_signs = MotorSigns()
         self.round_trip = RoundTrip()
+        self.answers = Answers()
         #: How often it was seen to arm; when it last said whether it is armed, monotonic s.
         self.arming_count = 0
         self.armed_told_at = -math.inf
@@ -174,6 +176,8 @@ class AutopilotTracker:
                 message.autopilot, self.vehicle_type, message.custom_mode
             )
         changes = self.liveness.heard(now)
+        if any(change.regained for change in changes):
+            self.answers = Answers()
         firmware = firmware_of(message.autopilot)
         if changes or firmware is not self.settings.firmware:
             self._begin_streams()
@@ -207,9 +211,13 @@ class AutopilotTracker:
             return False
         self.motor_signs.heard(message, now)
         if kind in ("PARAM_VALUE", "PARAM_ERROR"):
-            self.settings.heard(message)
+            answer = self.settings.heard(message)
         elif kind == "TIMESYNC":
-            self.round_trip.heard(message, now)
+            answer = self.round_trip.heard(message, now)
+        else:
+            answer = False
+        if answer:
+            self.answers.answered(now)
         self._streams.received(len(message.get_msgbuf()))
         if not self._readers.read(message, now):
             return False
@@ -246,8 +254,18 @@ class AutopilotTracker:
 
     def _faults(self, now: float) -> tuple[str, ...]:
         # Of one that is not heard that is the reason, not its rates.
-        heard = self.liveness.state is LinkState.OK
-        return (*self._streams.faults(now), *self.round_trip.faults(now)) if heard else ()
+        if self.liveness.state is not LinkState.OK:
+            return ()
+        faults = [*self._streams.faults(now), *self.round_trip.faults(now)]
+        asked = "command, TIMESYNC or parameter request"
+        if self.known_to_answer and (deaf := self.answers.fault(asked, now)):
+            faults.append(f"autopilot {self.device} {deaf}")
+        return tuple(faults)
+
+    @property
+    def known_to_answer(self) -> bool:
+        """Its firmware is one that answers commands, TIMESYNC and parameter requests."""
+        return self.settings.firmware is not Firmware.OTHER
 
     def _begin_streams(self) -> None:
         self.round_trip = RoundTrip()
@@ -282,6 +300,7 @@ class AutopilotTracker:
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
         self._begin_streams()
+        self.answers.restarted()
         self.settings.begin(self.settings.firmware, now)
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         self._readings.forget("armed", "landed_state")

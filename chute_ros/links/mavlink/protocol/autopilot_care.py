@@ -87,6 +87,9 @@ class AutopilotCare:
         self._settings(autopilot, now)
         if (question := autopilot.round_trip.question(now)) is not None:
             self._outbox.send(question, now)
+            autopilot.answers.asked(now)
+        if autopilot.known_to_answer and autopilot.answers.due(autopilot.liveness.since, now):
+            self._requests.commands.send_once(goals.request_heartbeat(autopilot), now)
         undone = bool(self.block.reason) and self._config.disarm_when_blocked
         for ask in self._heartbeats.due(autopilot, faster, undone, now):
             self._requests.commands.send_once(ask, now)
@@ -150,6 +153,7 @@ class AutopilotCare:
         if name := settings.due(now):
             ids, encoded = (autopilot.system_id, autopilot.component_id), name.encode()
             self._outbox.send(dialect.MAVLink_param_request_read_message(*ids, encoded, -1), now)
+            autopilot.answers.asked(now)
 
     def _still_wanted(self, autopilot: AutopilotTracker, now: float) -> None:
         if not self.block.stands(autopilot, now):

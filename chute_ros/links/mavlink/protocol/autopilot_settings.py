@@ -97,23 +97,25 @@ class AutopilotSettings:
         self._asked, self._tries = now, self._tries + 1
         return self._left[0]
 
-    def heard(self, message: Any) -> None:
-        """A PARAM_VALUE or PARAM_ERROR of the autopilot."""
+    def heard(self, message: Any) -> bool:
+        """A PARAM_VALUE or PARAM_ERROR of the autopilot. Returns whether we have asked for it."""
         name = message.param_id
         if name not in NAMES[self.firmware]:
-            return
+            return False
+        asked = bool(self._tries) and name == self._left[0]
         if message.get_type() == "PARAM_ERROR":
             if message.error == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST:
                 self._values.pop(name, None)
                 self._denied.add(name)
                 self._answered(name)
-            return
+            return asked
         value = self._decoded(message)
         if math.isfinite(value):
             self._values[name] = value
             self._denied.discard(name)
             self._absent.discard(name)
             self._answered(name)
+        return asked
 
     def get(self, name: str) -> float | None:
         """Its value; None: not read, or not there."""

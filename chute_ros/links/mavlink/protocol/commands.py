@@ -189,14 +189,14 @@ class CommandTransactions:
         if key in self._open:
             self._open[key].others += 1
 
-    def acknowledged(self, ack: Acknowledgement, now: float) -> list[int]:
+    def acknowledged(self, ack: Acknowledgement, now: float) -> list[int] | None:
         """An acknowledgement that is addressed to us came. Returns whose command it says to be in
-        progress."""
+        progress; None: it answers none of ours."""
         key = (ack.system_id, ack.component_id, ack.number)
         sends, transaction = self._sends.get(key), self._open.get(key)
         if sends is None:
             self.unexpected_count += 1
-            return []
+            return None
         others = 0 if transaction is None else self._others_of(key, transaction, now)
         if ack.result == results.IN_PROGRESS:
             sends.in_progress(now, self.limits.in_progress_timeout)
@@ -207,7 +207,8 @@ class CommandTransactions:
             return list(transaction.tokens)
         if not sends.answer(now):
             self.unexpected_count += 1
-        elif transaction is None:
+            return None
+        if transaction is None:
             self.late_count += 1
         else:
             transaction.answers[ack.result] += 1

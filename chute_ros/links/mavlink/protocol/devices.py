@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.answers import Answers
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
@@ -154,6 +155,15 @@ class Devices(EventLog):
         parachute = self.parachutes.get(*ids) or self._unproven.get(ids)
         if parachute is not None and ack.number == dialect.MAV_CMD_SET_PARACHUTE_ARM:
             parachute.arming_answered(ack.result, now)
+
+    def answers(self, ids: Ids) -> list[Answers]:
+        """Of those with these ids, what tells whether they hear us."""
+        found = (self.parachutes.get(*ids), self.autopilots.get(*ids))
+        return [device.answers for device in found if device is not None]
+
+    def deaf_parachutes(self, now: float) -> list[str]:
+        """Which parachutes of ours do not hear us."""
+        return [text for one in self.parachutes.all() if (text := one.deaf(now))]
 
     def motors_remark(self) -> str:
         """What whoever releases a parachute must know of the motors; empty: nothing."""

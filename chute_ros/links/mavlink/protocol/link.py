@@ -22,7 +22,7 @@ from chute_ros.links.mavlink.protocol.devices import Devices
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
 from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
-from chute_ros.model import LinkState, TriggerFlags, VehicleState
+from chute_ros.model import Armed, LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
@@ -252,6 +252,10 @@ class MavlinkLink:
         """Why it is doubtful which devices are ours."""
         return self._devices.doubts(now)
 
+    def deaf_parachutes(self, now: float) -> list[str]:
+        """Which parachutes of ours do not hear us."""
+        return self._devices.deaf_parachutes(now)
+
     # -- inside ----------------------------------------------------------------------------------
 
     def _frames(self, frames: list[Frame], now: float) -> None:
@@ -291,8 +295,12 @@ class MavlinkLink:
             ack = Acknowledgement(
                 frame.system_id, frame.component_id, message.command, message.result
             )
-            for number in self.requests.commands.acknowledged(ack, now):
+            in_progress = self.requests.commands.acknowledged(ack, now)
+            for number in in_progress or ():
                 self.requests.in_progress(number, "IN_PROGRESS was the last answer")
+            if in_progress is not None:
+                for answers in self._devices.answers((frame.system_id, frame.component_id)):
+                    answers.answered(now)
             self._devices.answered(ack, now)
 
     def _release_allowed(self) -> bool:
@@ -357,9 +365,13 @@ class MavlinkLink:
             self.requests.commands.send_once(order, now)
 
     def _look_after_parachutes(self, now: float) -> None:
-        """Ask for the status that does not come; a ground station may have switched it off."""
+        """Ask for the status that does not come: a ground station may have switched it off. And
+        before flight, whether we are heard."""
+        autopilot = self._devices.chosen_autopilot()
+        flies = autopilot is not None and autopilot.armed is Armed.ARMED
         for parachute in self.parachutes.all():
-            if parachute.status_due(now):
+            due = parachute.status_due(now)
+            if due or (not flies and parachute.question_due(now)):
                 self.requests.commands.send_once(goals.request_status(parachute), now)
 
     def _drive(self, now: float) -> None:
@@ -373,3 +385,5 @@ class MavlinkLink:
             command.system_id, command.component_id, command.number, confirmation, *command.params
         )
         self._outbox.send(message, now)
+        for answers in self._devices.answers((command.system_id, command.component_id)):
+            answers.asked(now)

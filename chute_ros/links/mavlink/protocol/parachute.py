@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.answers import Answers
 from chute_ros.links.mavlink.protocol.twins import Twins
 from chute_ros.model import (
     TRIGGER_SOURCES,
@@ -122,6 +123,7 @@ class ParachuteTracker(DeviceTracker):
         self.component_id = component_id
         self.information: ComponentInformation | None = None
         self.reboot_count = 0
+        self.answers = Answers()
         self._clock = BootClock()
         self._twins = Twins()
         self._ignored_errors = int(status.ignored_errors)
@@ -167,14 +169,19 @@ class ParachuteTracker(DeviceTracker):
     def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
         """A HEARTBEAT of the device."""
         self._system_status = message.system_status
-        return self.liveness.heard(now)
+        changes = self.liveness.heard(now)
+        if any(change.regained for change in changes):
+            self.answers = Answers()
+        return changes
 
     def parachute_status(self, message: Any, now: float) -> None:
         """A PARACHUTE_STATUS of the device."""
         if not self._twins.observe("PARACHUTE_STATUS", message.time_boot_ms, now):
             return
         age = self._clock.observe(message.time_boot_ms)
-        self.reboot_count += age is Age.RESTARTED and not self._twins.found(now)
+        if age is Age.RESTARTED and not self._twins.found(now):
+            self.reboot_count += 1
+            self.answers.restarted()
         self._doubtful = age is Age.DOUBTFUL
         if age in (Age.OLD, Age.DOUBTFUL):
             # Delayed: it must not undo what a newer one said.
@@ -189,6 +196,17 @@ class ParachuteTracker(DeviceTracker):
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
         return self._twins.doubt(f"two parachutes have the ids {self.device}", now)
+
+    def deaf(self, now: float) -> str:
+        """That it does not hear us, in words; empty: nothing tells so."""
+        heard = self.liveness.state is LinkState.OK
+        fault = self.answers.fault("command", now) if heard else ""
+        return f"parachute {self.device} {fault}" if fault else ""
+
+    def question_due(self, now: float) -> bool:
+        """It is to be asked something now, to know that it hears us."""
+        heard = self.liveness.state is LinkState.OK
+        return heard and self.answers.due(self.liveness.since, now)
 
     def status_due(self, now: float) -> bool:
         """It is to be asked for its status now (MAV_CMD_REQUEST_MESSAGE; the full protocol only

@@ -43,14 +43,16 @@ class RoundTrip:
         self._asked.append(round(now * _NS))
         return dialect.MAVLink_timesync_message(0, self._asked[-1])
 
-    def heard(self, message: Any, now: float) -> None:
-        """A TIMESYNC of the autopilot: an answer to one of ours counts."""
+    def heard(self, message: Any, now: float) -> bool:
+        """A TIMESYNC of the autopilot. Returns whether it answers one of ours: others do not
+        count."""
         if message.tc1 == 0 or message.ts1 not in self._asked:
-            return
+            return False
         while self._asked.popleft() != message.ts1:
             pass
         self._taken.append(now - message.ts1 / _NS)
         self._answered_at = now
+        return True
 
     def seconds(self, now: float) -> float:
         """The shorter one of the newest two (one answer may have lost its way), s; NaN: it does

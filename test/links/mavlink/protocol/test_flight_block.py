@@ -190,10 +190,12 @@ def test_nothing_is_forced_on_a_vehicle_that_was_armed_before_the_block():
 
 
 def test_an_old_heartbeat_is_asked_for_while_flight_is_blocked():
-    bench = on_the_ground(copter).stream(2.5, 0.1, PILOT, lambda: at_height(0.0))
+    bench = on_the_ground(copter).stream(1.9, 0.1, PILOT, lambda: at_height(0.0))
     asked = [m for m in bench.commands(REQUEST) if m.param1 == 0]
     assert 4 <= len(asked) <= 7
-    bench.call("flight_block", "").clear().stream(2.9, 0.1, PILOT, lambda: at_height(0.0))
+    bench.hear(PILOT, ack(REQUEST)).call("flight_block", "").clear().stream(
+        2.4, 0.1, PILOT, lambda: at_height(0.0)
+    )
     assert bench.commands(REQUEST) == []
 
 

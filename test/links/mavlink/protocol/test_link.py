@@ -2,7 +2,9 @@
 
 import importlib.util
 import math
+import random
 import sys
+from typing import Any
 
 import pytest
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
@@ -10,6 +12,9 @@ from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 from chute_ros.errors import NotBuiltError, ParameterError
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.flight_block import DISARM_INTERVAL
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged
 from chute_ros.protocol.mavlink import dialect as dialect_module
@@ -23,10 +28,12 @@ from chute_ros.protocol.mavlink.signing import (
     SigningClock,
     Verifier,
 )
+from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.sim.autopilot_kinds import ARDUCOPTER, GENERIC, PX4
 
 CHUTE, SECOND, PILOT, GROUND = (1, 161), (1, 162), (1, 1), (255, 190)
 GCS = heartbeat(d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID)
-DISARM, RELEASE = 400, 208
+DISARM, RELEASE, REQUEST = 400, 208, 512
 
 
 def test_several_parachutes_at_once():
@@ -350,7 +357,8 @@ def asked_for_status(bench):
 
 def test_a_module_that_sends_no_status_is_asked_for_it():
     """Given one without a stream, or whose stream a ground station has switched off."""
-    bench = Bench().hear(CHUTE, heartbeat()).stream(4.0, 0.5, CHUTE, heartbeat)
+    bench = Bench().hear(CHUTE, heartbeat()).stream(1.5, 0.5, CHUTE, heartbeat)
+    bench.hear(CHUTE, ack(REQUEST)).stream(4.0, 0.5, CHUTE, heartbeat)
     assert asked_for_status(bench) == pytest.approx([1.5, 3.0])
     request = bench.commands(d.MAV_CMD_REQUEST_MESSAGE)[0]
     assert (request.target_system, request.target_component) == CHUTE
@@ -360,13 +368,21 @@ def test_a_module_that_sends_no_status_is_asked_for_it():
     assert asked_for_status(bench)[2:] == pytest.approx([5.5])
 
 
-def test_one_that_streams_or_is_silent_is_not_asked():
+def test_one_that_streams_is_asked_now_and_then_to_know_that_it_hears_us():
     bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=1000))
-    for second in range(1, 10):
+    for second in range(1, 40):
         bench.at(second).hear(CHUTE, heartbeat(), status(boot_ms=1000 + 1000 * second))
-    assert asked_for_status(bench) == []
+        if second in asked_for_status(bench):
+            bench.hear(CHUTE, ack(REQUEST, d.MAV_RESULT_UNSUPPORTED))
+    assert asked_for_status(bench) == [2, 12, 22, 32]
+    # In flight, and as long as it is not heard, it is not.
+    bench.hear(PILOT, copter(armed=True))
+    for second in range(40, 60):
+        bench.at(second).hear(PILOT, copter(armed=True))
+        bench.hear(CHUTE, heartbeat(), status(boot_ms=1000 + 1000 * second))
+    assert len(asked_for_status(bench)) == 4
     bench = Bench().hear(CHUTE, heartbeat(), status()).at(1.0).hear(CHUTE, status(boot_ms=6000))
-    assert len(asked_for_status(bench.at(60.0))) <= 1
+    assert len(asked_for_status(bench.at(60.0))) <= 3
 
 
 def test_the_first_status_after_a_restart_is_followed_by_a_question():
@@ -382,3 +398,106 @@ def test_the_first_status_after_a_restart_is_followed_by_a_question():
     for step in range(1, 100):
         bench.at(0.5 + step * 0.01).hear(CHUTE, status(boot_ms=1000 - 10 * step))
     assert len(asked_for_status(bench)) <= 11
+
+
+# -- a line that is dead in one direction ---------------------------------------------------------
+
+
+class Line:
+    """A parachute and an autopilot as simulated, on a line that drops these parts of what is sent
+    to each, and of what it sends."""
+
+    def __init__(self, kind, loss=0.0):
+        self.t = START
+        self.runtime = MavlinkRuntime("mavlink_parachute", MavlinkSettings(), Any)
+        self.link = MavlinkLink(self.runtime.settings.link)
+        self.parachute = ParachuteDevice(ParachuteSettings(), [])
+        self.autopilot = AutopilotDevice(1, [], kind=kind)
+        self.to = {self.parachute: loss, self.autopilot: loss}
+        self.back, self.chance = loss, random.Random(1)
+
+    def passes(self, loss):
+        return self.chance.random() >= loss
+
+    def run(self, seconds):
+        """The reasons against flight that it gave meanwhile for not being heard."""
+        told = set()
+        for _ in range(round(seconds / 0.02)):
+            self.t += 0.02
+            for device in self.to:
+                device.update(self.t)
+                for frame in device.take_output():
+                    if self.passes(self.back):
+                        self.link.receive(frame, self.t)
+            self.link.update(self.t)
+            for frame in self.link.take_output():
+                for device, loss in self.to.items():
+                    if self.passes(loss):
+                        device.receive(frame, self.t)
+            self.link.take_events()
+            told |= set(self.reasons())
+        return told
+
+    def reasons(self):
+        summary = self.runtime.summarise(self.link, self.t)
+        reasons = (*summary.reasons, *self.link.vehicle_state(self.t).faults)
+        return [one for one in reasons if "does not hear us" in one]
+
+
+@pytest.mark.parametrize("kind", [PX4, ARDUCOPTER])
+def test_an_autopilot_that_hears_nothing_of_ours_forbids_take_off(kind):
+    line = Line(kind)
+    line.to[line.autopilot] = 1.0
+    assert line.run(9.0) == set()
+    line.run(3.0)
+    (reason,) = line.reasons()
+    assert reason.startswith("autopilot 1/1 does not hear us: no answer to any command, TIMESYNC")
+    assert "check our TX line" in reason
+    # The first answer ends it; a line that dies later is found as well.
+    line.to[line.autopilot] = 0.0
+    line.run(1.5)
+    assert line.run(30.0) == set()
+    line.to[line.autopilot] = 1.0
+    assert line.run(19.0) == set()
+    assert line.run(3.0)
+
+
+def test_an_unknown_autopilot_is_not_taken_to_answer():
+    line = Line(GENERIC)
+    line.to[line.autopilot] = 1.0
+    assert line.run(60.0) == set()
+
+
+def test_a_parachute_that_hears_nothing_of_ours_forbids_take_off_and_nothing_in_flight():
+    line = Line(PX4)
+    line.to[line.parachute] = 1.0
+    assert line.run(10.0) == set()
+    line.run(3.5)
+    (reason,) = line.reasons()
+    assert reason.startswith("parachute 1/161 does not hear us: no answer to any command for ")
+    assert not line.runtime.summarise(line.link, line.t).device_healthy
+    line.autopilot.model.armed = True
+    line.run(1.5)
+    assert line.run(30.0) == set()
+    line.autopilot.model.armed = False
+    line.run(1.5)
+    assert line.reasons()
+    line.to[line.parachute] = 0.0
+    line.run(1.0)
+    assert line.run(30.0) == set()
+
+
+@pytest.mark.parametrize("kind", [PX4, ARDUCOPTER])
+def test_a_line_that_loses_three_frames_of_ten_in_each_direction_is_no_dead_one(kind):
+    assert Line(kind, loss=0.3).run(120.0) == set()
+
+
+def test_a_parachute_that_restarts_or_comes_back_has_to_answer_again():
+    line = Line(PX4)
+    line.run(30.0)
+    line.to[line.parachute] = 1.0
+    line.parachute.silent = True
+    line.run(8.0)
+    line.parachute.reboot()
+    assert line.run(9.5) == set()
+    assert line.run(3.0)
