@@ -76,8 +76,8 @@ class WireLoop(Generic[LinkT]):
         self.last_run = time.monotonic()
         #: Of reading what the wire brings.
         self.late = Lateness()
-        #: Nothing waited to be read, monotonic s.
-        self._caught_up_at = time.monotonic()
+        #: When nothing waited to be read from each of the wire's files, monotonic s.
+        self._empty_at: dict[int, float] = {}
         self._deliver, self._opened, self._not_written = deliver, opened, not_written
         self._watch = WireWatch(wire, frames, deliver)
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
@@ -171,7 +171,7 @@ class WireLoop(Generic[LinkT]):
                 if file == self._wake_in.fileno():
                     self._wake_in.recv(4096)
                 elif file in self.wire.files():  # the one before it may have ended the wire
-                    self._read(file, now)
+                    self._read(file, poll, now)
             # What this brings about leaves before the link looks at its clock.
             self._send()
             self._make_calls(now)
@@ -187,16 +187,24 @@ class WireLoop(Generic[LinkT]):
 
     def _await(self, poll: select.poll, wait: int) -> list[tuple[int, int]]:
         """What is ready, within so many ms; how long it may have waited is noted."""
-        ready = poll.poll(0)
-        if not any(file != self._wake_in.fileno() for file, _ in ready):
-            began = self._caught_up_at = time.monotonic()
-            if not ready:
-                ready = poll.poll(wait)
-                # One that was not let run when something came cannot know when that was.
-                self._caught_up_at = min(time.monotonic(), began + wait / 1000.0)
+        began = time.monotonic()
+        ready = self._waiting(poll)
+        if not ready:
+            ready = poll.poll(wait)
+            # One that was not let run when something came cannot know when that was.
+            came_at = min(time.monotonic(), began + wait / 1000.0)
+            self._empty_at = dict.fromkeys(self._empty_at, came_at)
         now = time.monotonic()
         if ready:
-            self.late.note(now - self._caught_up_at, now)
+            waited = (now - self._empty_at[file] for file, _ in ready if file in self._empty_at)
+            self.late.note(max(waited, default=0.0), now)
+        return ready
+
+    def _waiting(self, poll: select.poll) -> list[tuple[int, int]]:
+        """What is ready now; that the others are empty is noted."""
+        now = time.monotonic()
+        ready = poll.poll(0)
+        self._empty_at |= dict.fromkeys(self._empty_at.keys() - {file for file, _ in ready}, now)
         return ready
 
     def _take_turn(self) -> bool:
@@ -239,8 +247,10 @@ class WireLoop(Generic[LinkT]):
         """What to wait for, and at most how long, ms."""
         poll = select.poll()
         poll.register(self._wake_in, select.POLLIN)
-        for file in self.wire.files():
+        files = self.wire.files()
+        for file in files:
             poll.register(file, select.POLLIN)
+        self._empty_at = {file: self._empty_at.get(file, now) for file in files}
         # A call may have left a deadline that is long over, as minus infinity.
         wait = max(0.0, min(self.link.next_deadline() - now, LONGEST_WAIT))
         if self._calls:
@@ -248,12 +258,14 @@ class WireLoop(Generic[LinkT]):
         # Rounded up: a wait that ends before its deadline would only have to be repeated.
         return poll, int(wait * 1000.0 + 0.999)
 
-    def _read(self, file: int, now: float) -> None:
+    def _read(self, file: int, poll: select.poll, now: float) -> None:
         try:
             chunks = self.wire.read(file)
         except OSError as error:
             self._lost(f"{self.wire.describe()}: {error}", now)
             return
+        # What comes from now on waits for no longer than this takes to be handled.
+        self._waiting(poll)
         for data, stream in chunks:
             if data or stream is None:
                 self._watch.before_data()

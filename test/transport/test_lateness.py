@@ -44,3 +44,22 @@ def test_a_loop_to_which_nothing_comes_for_a_while_is_not_late(await_until):
         device.sendto(b"at last", (LOCAL, node.port))
         await_until(lambda: node.link.received, "it is read")
         assert node.loop.late.most(time.monotonic()) < HELD_UP
+
+
+def test_one_that_always_finds_the_next_datagram_is_late_by_one_turn_and_not_since_it_began(
+    await_until,
+):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+
+        def next_one(data):
+            # What comes while this one is worked at waits for so long.
+            device.sendto(b"next", (LOCAL, node.port))
+            time.sleep(0.002)
+
+        node.link.answer = next_one
+        began = time.monotonic()
+        device.sendto(b"first", (LOCAL, node.port))
+        await_until(lambda: time.monotonic() > began + 2 * HELD_UP, "it goes on for a while")
+        assert len(node.link.received) > 50
+        assert 0.001 < node.loop.late.most(time.monotonic()) < HELD_UP
+        node.link.answer = lambda data: None
