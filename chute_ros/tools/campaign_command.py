@@ -28,7 +28,7 @@ from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tapes import TapeFile, Tapes
-from chute_ros.errors import CampaignError, RecordError
+from chute_ros.errors import CampaignError, ChuteError, RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
@@ -39,6 +39,7 @@ from chute_ros.tools.campaign_picture import picture
 from chute_ros.tools.campaign_plan import plan
 from chute_ros.tools.campaign_vehicle import FLIGHTS, fly_described, refuse_unfit
 from chute_ros.tools.machine import machine
+from chute_ros.tools.page_file import MARKDOWN, SVG, require_output, write_page
 
 #: Where none are asked for.
 _FLIGHTS = 1000
@@ -91,7 +92,7 @@ def main() -> None:
         help="fly on the workers of this Dask cluster",
     )
     options.add_argument(
-        "--page", type=writable, help="write the results to this page, with pictures beside it"
+        "--page", type=page_path, help="write the results to this page, with pictures beside it"
     )
     options.add_argument(
         "--failures",
@@ -150,7 +151,7 @@ def main() -> None:
     if chosen.vehicle is not None:
         try:
             fly_described(options, chosen, profiles)
-        except CampaignError as error:
+        except ChuteError as error:
             sys.exit(f"campaign: {error}")
         return
     chosen.flights = chosen.flights or _FLIGHTS
@@ -199,20 +200,27 @@ def main() -> None:
         print(f"not saved (name another folder with --failures): {progress.unsaved}")
     elif tally.wrong:
         print(f"saved in {chosen.failures}; --replay FILE shows one step by step")
+    unwritten = ""
     if chosen.page and tally.flights:
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
         flown_tapes = campaign.shipped(profiles, file).tapes
-        if flown_tapes is None:
-            _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
-        else:
-            command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
-            chosen.page.write_text(page_of_bodies(tally, flown_tapes, command, flyers.how))
+        try:
+            if flown_tapes is None:
+                _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
+            else:
+                command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
+                told = page_of_bodies(tally, flown_tapes, command, flyers.how)
+                write_page(chosen.page, told, MARKDOWN)
+        except ChuteError as error:
+            unwritten = str(error)
     flown = tally.flights - before
     if chosen.plan and flown:
         rate = flown / (tally.took - took_before) / flyers.number
         print(plan(chosen.plan, rate, flown, chosen.core_hour_price))
     if broken:
         sys.exit(f"campaign: {broken}; {_BROKEN}")
+    if unwritten:
+        sys.exit(f"campaign: {unwritten}")
     if tally.wrong:
         sys.exit(1)
     if tally.flights < len(seeds):
@@ -368,6 +376,17 @@ def writable(text: str) -> Path:
     return path
 
 
+def page_path(text: str) -> Path:
+    """The same, of a page with its picture beside it, which go over nothing else."""
+    path = writable(text)
+    try:
+        require_output(path, MARKDOWN)
+        require_output(path.with_suffix(".svg"), SVG)
+    except ChuteError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return path
+
+
 def scenario(text: str) -> int | Scenario:
     """A seed, or what is in a file that was saved."""
     if text.removeprefix("-").isdecimal():
@@ -391,10 +410,10 @@ def tapes(text: str) -> Path:
 
 def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEach | None) -> None:
     drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
-    drawn["delays"].write_text(picture(tally.lines, "release_delay"))
-    drawn["heights"].write_text(picture(tally.lines, "height_lost"))
+    write_page(drawn["delays"], picture(tally.lines, "release_delay"), SVG)
+    write_page(drawn["heights"], picture(tally.lines, "height_lost"), SVG)
     names = {what: one.name for what, one in drawn.items()}
-    path.write_text(page(tally, seed, how, names, of_each))
+    write_page(path, page(tally, seed, how, names, of_each), MARKDOWN)
 
 
 def _replay(profiles: Path, scenario: Scenario, tapes: TapeFile | None) -> None:

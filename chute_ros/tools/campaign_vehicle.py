@@ -16,6 +16,7 @@ from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.tools.heights_page import Result, heights, page, times
 from chute_ros.tools.heights_picture import picture
 from chute_ros.tools.machine import machine
+from chute_ros.tools.page_file import MARKDOWN, SVG, write_page
 from chute_ros.tools.progress import Progress
 
 #: Of each failure, where none are asked for: enough for the statement.
@@ -82,8 +83,8 @@ def _write(results: Sequence[Result], path: Path, command: str, how: str) -> Non
     for one in results:
         allows = one.profile.below_minimum is BelowMinimum.DEPLOY
         lowest = 0.0 if allows else one.profile.minimum_height
-        path.with_name(one.picture).write_text(picture(one.plain, lowest))
-    path.write_text(page(results, command, how))
+        write_page(path.with_name(one.picture), picture(one.plain, lowest), SVG)
+    write_page(path, page(results, command, how), MARKDOWN, [one.file for one in results])
 
 
 def _command(chosen: Namespace, flights: int) -> str:

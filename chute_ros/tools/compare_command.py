@@ -18,13 +18,14 @@ from chute_ros.campaign.comparison import Compared, compare, shipped
 from chute_ros.campaign.guards import GUARDS
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.pool import flown_here
-from chute_ros.errors import CampaignError
+from chute_ros.errors import CampaignError, ChuteError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools.arguments import positive
-from chute_ros.tools.campaign_command import writable
+from chute_ros.tools.campaign_command import page_path
 from chute_ros.tools.compare_page import Run, page
 from chute_ros.tools.compare_picture import curves, delays
 from chute_ros.tools.machine import machine
+from chute_ros.tools.page_file import MARKDOWN, SVG, write_page
 
 _TELL_EVERY = 5.0  # s
 
@@ -38,7 +39,7 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
     options.add_argument(
-        "--page", type=writable, help="write the results to this page, with pictures beside it"
+        "--page", type=page_path, help="write the results to this page, with pictures beside it"
     )
     chosen = options.parse_args()
     begun, lines, seeds, ended = time.monotonic(), [], 0, ""
@@ -60,7 +61,10 @@ def main() -> None:
     print(f"{seeds} of {chosen.flights} seeds in {took:.0f} s")
     if chosen.page and lines:
         how = f"{chosen.jobs} at a time on {machine()}"
-        _write(chosen.page, Run(seeds, chosen.seed, took, how), lines)
+        try:
+            _write(chosen.page, Run(seeds, chosen.seed, took, how), lines)
+        except ChuteError as error:
+            ended = ended or f"compare: {error}"
     elif chosen.page:
         print(f"{chosen.page} is not written: none of these flights is one of an aircraft")
     if any(line.count is Count.BROKEN for line in lines):
@@ -104,5 +108,5 @@ def _write(path: Path, run: Run, lines: list[Compared]) -> None:
         path.with_suffix(".delays.svg"): delays(lines),
     }
     for one, text in drawn.items():
-        one.write_text(text, encoding="utf-8")
-    path.write_text(page(lines, run, [one.name for one in drawn]), encoding="utf-8")
+        write_page(one, text, SVG)
+    write_page(path, page(lines, run, [one.name for one in drawn]), MARKDOWN)

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.plain_text import plain
+from chute_ros.tools.page_file import HTML, write_page
 from chute_ros.tools.recordings import chosen, listed
 
 
@@ -73,18 +74,10 @@ def write_pages(
 
     def make(files: list[Path], output: Path | None) -> None:
         path = output or files[0].with_name(f"{files[0].name}{ending}")
-        write(path, page(files))
+        write_page(path, page(files), HTML, files)
         print(path, flush=True)
 
     sys.exit(0 if make_each(program, options.parse_args(), "one page", make) else 2)
-
-
-def write(path: Path, text: str) -> None:
-    """ChuteError in one line if it cannot be."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ChuteError(f"{path}: {error.strerror or error}") from None
 
 
 def complain(program: str, error: ChuteError) -> None:

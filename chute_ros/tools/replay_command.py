@@ -19,10 +19,11 @@ from chute_ros.plain_text import plain
 from chute_ros.supervisor.codec import CLASS
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
+from chute_ros.tools.page_file import SVG, write_page
 from chute_ros.tools.parameter_file import NODE, other_from
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, read
-from chute_ros.tools.recording_options import complain, recording_options, write
+from chute_ros.tools.recording_options import complain, recording_options
 from chute_ros.tools.recordings import chosen, listed
 from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
@@ -92,7 +93,8 @@ def _replay(files: list[Path], config: Path | None, wanted: Path | None) -> int:
     if wanted is None and other is not None:
         wanted = files[0].with_name(f"{files[0].name}.replay.svg")
     if wanted is not None:
-        write(wanted, picture(recording, before, after))
+        read_here = [*files, *([config] if config else [])]
+        write_page(wanted, picture(recording, before, after), SVG, read_here)
     return _print_end(recording, found, now, wanted)
 
 

@@ -51,6 +51,7 @@ run = partial(call, campaign)
         (["--core-hour-price", "nan"], "--core-hour-price: nan: need a number, 0 or more"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
         (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
+        (["--page", __file__], "test_campaign_command.py exists and is no Markdown page: remove"),
         (["--tapes", "/nowhere"], "argument --tapes: /nowhere: No such file or directory"),
         (["--tapes", __file__], "test_campaign_command.py: no file of tapes: it does not begin"),
         (

@@ -346,3 +346,19 @@ def test_a_wrong_argument_ends_it_in_a_line(arguments, says, landed, tmp_path):
     assert ended.returncode == 2
     assert says in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_no_page_goes_over_a_log_or_what_is_known_of_it(landed, tmp_path):
+    log = FORMATS["flight.tlog"]([one for one in landed if one.at < 3.0], tmp_path / "well.tlog")
+    known = tmp_path / "known.tsv"
+    known.write_text("file\tsource\treal\twhat_happened\tright\tfrom\tuntil\n")
+    before = log.read_bytes(), known.read_bytes()
+    for arguments in (
+        ("--page", log),
+        ("--page", known, "--known", known),
+        ("--table", known, "--known", known),
+    ):
+        ended = run(log, *arguments)
+        assert ended.returncode == 2
+        assert f"{arguments[1]} is read here: nothing is written over it" in ended.stderr
+    assert (log.read_bytes(), known.read_bytes()) == before

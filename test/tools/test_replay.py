@@ -243,6 +243,16 @@ def test_what_cannot_be_read_or_written_is_told_without_a_traceback(
     assert "No such file" in capsys.readouterr().err
 
 
+def test_the_picture_goes_over_nothing_that_was_read(flight, other, monkeypatch, capsys):
+    config = other("mode: SHADOW")
+    for one in (*flight.files(), config):
+        before = one.read_bytes()
+        given = (*flight.files(), "--config", config, "--picture", one)
+        assert run(replay.main, monkeypatch, *given) == 2
+        assert f"replay: {one} is read here" in capsys.readouterr().err
+        assert one.read_bytes() == before
+
+
 def test_a_hostile_name_moves_no_cursor(tmp_path, monkeypatch, capsys):
     flight = Flight(tmp_path)
     flight.reason = "\x1b[2J\x07falls\n\u202e"

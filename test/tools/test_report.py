@@ -340,6 +340,32 @@ def test_a_page_that_cannot_be_written_is_told(flight, tmp_path, monkeypatch, ca
     assert "No such file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_page_goes_over_no_recording(flight, linked, tmp_path, monkeypatch, capsys):
+    file = flight.files()[0]
+    output = tmp_path / "link" if linked else file
+    if linked:
+        output.symlink_to(file)
+    before = file.read_bytes()
+    assert run(report.main, monkeypatch, file, "--output", output) == 2
+    assert f"report: {output} is read here: nothing is written over it" in capsys.readouterr().err
+    assert file.read_bytes() == before
+
+
+def test_a_page_goes_over_an_earlier_one_and_over_nothing_else(
+    flight, tmp_path, monkeypatch, capsys
+):
+    output = tmp_path / "page.html"
+    for _ in range(2):
+        assert run(report.main, monkeypatch, *flight.files(), "--output", output) == 0
+    output.write_text("notes of the flight")
+    assert run(report.main, monkeypatch, *flight.files(), "--output", output) == 2
+    expected = f"report: {output} exists and is no HTML page: remove it, or name another\n"
+    assert capsys.readouterr().err.endswith(expected)
+    assert output.read_text() == "notes of the flight"
+    assert list(tmp_path.iterdir()) == [output], "nothing beside it"
+
+
 # What safety/state tells
 
 

@@ -35,6 +35,7 @@ from chute_ros.sim.command_line import real
 from chute_ros.tools.conformance.page import page
 from chute_ros.tools.conformance.report import Report
 from chute_ros.tools.conformance.traffic import write_mcap
+from chute_ros.tools.page_file import HTML, JUNIT, require_output, write_page
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
@@ -123,9 +124,12 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
     risk = Risk.FIRES if chosen.fire else Risk.ARMS if chosen.arm else Risk.NONE
     bench, wire = kit.bench(chosen, risk), kit.wire(chosen)
     given = {f"--{name.replace('_', '-')}" for name, value in vars(chosen).items() if value}
-    for file in (chosen.html, chosen.junit, chosen.mcap):
-        _writable(file)
+    # A long run must not end with a report that cannot be written.
+    if chosen.html:
+        require_output(chosen.html, HTML)
+    _writable(chosen.mcap)
     if chosen.junit:
+        require_output(chosen.junit, JUNIT)
         _junit()
     if risk is not Risk.NONE:
         _ask(kit, risk)
@@ -159,7 +163,6 @@ def _clauses(kit: Kit, only: Sequence[str]) -> list[Clause[Any]]:
 
 
 def _writable(file: Path | None) -> None:
-    """A long run must not end with a report that cannot be written."""
     if file is not None:
         try:
             file.open("ab").close()
@@ -269,8 +272,8 @@ def _line(event: Any) -> str:
 
 def _write(chosen: argparse.Namespace, report: Report) -> None:
     writers: list[tuple[Path | None, Callable[[Path], object]]] = [
-        (chosen.html, lambda path: path.write_text(page(report))),
-        (chosen.junit, lambda path: path.write_text(_junit()(report))),
+        (chosen.html, lambda path: write_page(path, page(report), HTML)),
+        (chosen.junit, lambda path: write_page(path, _junit()(report), JUNIT)),
         (chosen.mcap, lambda path: write_mcap(report, path)),
     ]
     for path, write in writers:

@@ -24,8 +24,9 @@ from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged, fly
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
+from chute_ros.tools.page_file import HTML, MARKDOWN, require_output, write_page
 from chute_ros.tools.progress import Progress
-from chute_ros.tools.recording_options import complain, write
+from chute_ros.tools.recording_options import complain
 from chute_ros.tools.state_rows import RuleTold
 
 CLEAN, FIRED, UNREADABLE = 0, 1, 2
@@ -42,7 +43,10 @@ def main() -> None:
     flights: list[tuple[Verdict, str]] = []
     unread: list[tuple[Path, LogError]] = []
     try:
-        columns = dict(given.column)
+        columns, read_here = dict(given.column), _read_here(given)
+        require_output(given.page, HTML, read_here)
+        if given.known:
+            require_output(given.table, MARKDOWN, read_here)
         for path in given.files:
             try:
                 log = formats.read(path, columns)
@@ -57,11 +61,12 @@ def main() -> None:
             # What was seen of a flight takes a hundred times as much memory.
             flights.append((verdict, flight_section(len(flights), verdict, one, tried)))
         if flights:
-            write(given.page, page(flights, unread))
+            write_page(given.page, page(flights, unread), HTML, read_here)
             print(f"page: {given.page}")
         if given.known:
             verdicts = [verdict for verdict, _ in flights]
-            write(given.table, known.page(verdicts, unread, known.known_of(given.known)))
+            told = known.page(verdicts, unread, known.known_of(given.known))
+            write_page(given.table, told, MARKDOWN, read_here)
             print(f"table: {given.table}")
     except ChuteError as error:
         complain("judge_log", error)
@@ -115,6 +120,12 @@ def _options() -> argparse.ArgumentParser:
         help=f"a column of a .csv, in SI units once multiplied ({', '.join(table.COLUMNS)})",
     )
     return options
+
+
+def _read_here(given: argparse.Namespace) -> list[Path]:
+    """All that is read, which no page may go over."""
+    others = [given.known] if given.known else []
+    return [*given.files, *others, *([Path(given.profile)] if given.profile else [])]
 
 
 def _column(text: str) -> tuple[str, table.Column]:
