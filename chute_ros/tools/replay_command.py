@@ -51,10 +51,6 @@ def main() -> None:
     except ChuteError as error:
         complain("replay", error)
         code = UNREADABLE
-    except BrokenPipeError:
-        # Whoever read the table has seen enough; the interpreter must not complain of it.
-        sys.stdout = None
-        code = UNREADABLE
     sys.exit(code)
 
 

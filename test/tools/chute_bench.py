@@ -23,9 +23,10 @@ CONTROL = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
 class Command:
     """One run. Its output is read when it has ended."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, redirected=""):
         self.process = subprocess.Popen(
-            [*COMMAND, *arguments],
+            # A shell, which it replaces, opens and closes its streams.
+            ["bash", "-c", f'exec "$@" {redirected}', "bash", *COMMAND, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -40,10 +41,12 @@ class Command:
         return self.process.returncode, out, err
 
 
-def run(bench, *arguments, namespace=None):
-    """Run it for the vehicle of this bench, which lives on meanwhile."""
+def run(bench, *arguments, namespace=None, redirected=""):
+    """Run it for the vehicle of this bench, which lives on meanwhile. redirected: its streams, as
+    in a shell."""
     name, *more = arguments
-    command = Command("--namespace", namespace or bench.namespace, name, *more)
+    given = ("--namespace", namespace or bench.namespace, name, *more)
+    command = Command(*given, redirected=redirected)
     bench.until(lambda: command.process.poll() is not None, f"chute {name} ends", 60.0)
     return command.ended()
 

@@ -101,6 +101,13 @@ def test_its_json_is_one_object(ready):
     assert [one["name"] for one in told["links"]] == ["mavlink_parachute"]
 
 
+def test_its_json_is_alone_where_the_middleware_complains_too(ready, monkeypatch):
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "/nowhere.xml")
+    code, out, err = run(ready.bench, "status", "--json")
+    assert (code, json.loads(out)["state"]) == (0, "READY")
+    assert "XMLPARSER" in err
+
+
 def test_where_nothing_is_heard_it_says_where_it_looked_and_what_there_is(ready):
     code, out, err = run(ready.bench, "status", "--timeout", "5", namespace="/nobody/here")
     assert (code, out, err.count("\n")) == (1, "", 1)
@@ -198,6 +205,21 @@ def test_reset_after_a_kill(ready):
     ready.await_stage(SafetyState.READY)
 
 
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_an_order_is_sent_whatever_stream_is_closed(ready, closed):
+    code, _, err = run(ready.bench, "arm", redirected=closed)
+    assert (code, err) == (0, "")
+    assert ready.link.arm_requests == [(True, 0)]
+
+
+def test_an_order_whose_answer_cannot_be_printed_tells_it_on_standard_error(ready):
+    code, _, err = run(ready.bench, "arm", redirected=">/dev/full")
+    assert (code, ready.link.arm_requests) == (74, [(True, 0)])
+    answer, why = err.splitlines()
+    assert answer == "chute: arm: done: mavlink_parachute: as told"
+    assert why == "chute: standard output cannot be written: No space left on device"
+
+
 # deploy and kill
 
 
@@ -272,9 +294,10 @@ def test_a_kill_alone_needs_no_parachute(cut_off):
     assert (code, err) == (0, "")
 
 
+@pytest.mark.parametrize("stdin", ["", "<&-"])
 @pytest.mark.parametrize("order", ["deploy", "kill"])
-def test_without_a_terminal_and_without_yes_nothing_is_sent(flying, order):
-    code, out, err = run(flying.bench, order, "--reason", "anything")
+def test_without_a_terminal_and_without_yes_nothing_is_sent(flying, order, stdin):
+    code, out, err = run(flying.bench, order, "--reason", "anything", redirected=stdin)
     assert (code, out) == (2, "")
     assert err == (
         f"chute: {order}: no terminal to ask at: nothing was sent; --yes does not ask\n"

@@ -1,6 +1,7 @@
 """Ctrl-C ends every tool in one line and with exit code 130, at whatever moment it comes."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -234,3 +235,85 @@ def test_one_that_is_to_ignore_it_goes_on(recording):
         file.write(b"no MCAP")
     _, err = started.communicate(timeout=60.0)
     assert (started.returncode, err) == (2, f"replay: {recording} is no MCAP file\n")
+
+
+# What nobody can read
+
+
+#: A tool with a result, of which something is printed.
+PRINTS = """
+import contextlib
+import os
+import sys
+import types
+
+
+def main():
+    with contextlib.suppress(OSError):
+        os.write(1, b"the middleware complains\\n")
+    print("remark", file=sys.stderr)
+    print("result")
+    sys.exit(1)
+
+
+module = types.ModuleType("chute_ros.tools.printing")
+module.main = main
+sys.modules[module.__name__] = module
+from chute_ros.tools.entry import run
+run("printing", "printing")
+"""
+
+
+def shell(arguments, redirections, command=(sys.executable, "-c", PRINTS)):
+    """Its exit code, and what it wrote to standard output and error, where they are open."""
+    line = f"{shlex.join([*command, *arguments])} {redirections}"
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", line],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+        timeout=120.0,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_what_others_write_to_descriptor_1_is_no_result():
+    complaint = "the middleware complains\n"
+    assert shell([], "") == (1, "result\n", f"{complaint}remark\n")
+
+
+@pytest.mark.parametrize(
+    ("redirections", "out", "err"),
+    [
+        ("<&-", "result\n", "remark\n"),
+        (">&-", "", "remark\n"),
+        ("2>&-", "result\n", ""),
+        ("<&- >&- 2>&-", "", ""),
+        ("2>/dev/full", "result\n", ""),
+    ],
+)
+def test_a_closed_stream_changes_no_result(redirections, out, err):
+    code, told, complained = shell([], redirections)
+    assert (code, told) == (1, out)
+    assert complained.endswith(err)
+    assert "Traceback" not in complained
+
+
+def test_what_cannot_be_printed_is_no_result():
+    code, _, err = shell([], ">/dev/full")
+    told = "printing: standard output cannot be written: No space left on device\n"
+    assert (code, err) == (74, f"the middleware complains\nremark\n{told}")
+
+
+def test_a_reader_who_has_seen_enough_is_told_nothing():
+    code, _, err = shell([], "| true")
+    assert (code, err) == (141, "the middleware complains\nremark\n")
+
+
+@pytest.mark.parametrize("tool", ["judge_log", "replay", "chute", "campaign"])
+def test_no_tool_takes_it_for_a_result(tool):
+    command = (sys.executable, "-m", f"chute_ros.tools.{tool}")
+    code, _, err = shell(["--help"], ">/dev/full", command)
+    told = f"{tool}: standard output cannot be written: No space left on device\n"
+    assert (code, err) == (74, told)

@@ -31,14 +31,7 @@ def main() -> None:
     sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     sys.stderr.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     chosen = parse()
-    try:
-        code = _run(chosen)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read it has seen enough; the interpreter must not complain of it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = NOT_WELL
-    sys.exit(code)
+    sys.exit(_run(chosen))
 
 
 def _run(chosen: Chosen) -> int:

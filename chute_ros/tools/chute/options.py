@@ -20,8 +20,8 @@ _LONGEST = 3600.0
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 EPILOG = """exit codes: 0 done, or the vehicle is well; 1 refused, failed, not well or not
-received; 2 a mistake in the command line, nothing was sent; 130 ended by
-Ctrl-C (docs/guide/command.md)"""
+received; 2 a mistake in the command line, nothing was sent; 74 standard output
+cannot be written; 130 ended by Ctrl-C; 141 nobody reads on (docs/guide/command.md)"""
 
 
 @dataclass(frozen=True)

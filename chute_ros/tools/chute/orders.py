@@ -6,6 +6,7 @@ import getpass
 import socket
 import sys
 
+from chute_ros.plain_text import plain
 from chute_ros.tools.chute.calling import Call
 from chute_ros.tools.chute.confirmation import ask, require_terminal
 from chute_ros.tools.chute.json_text import json_text
@@ -22,6 +23,7 @@ from chute_ros.tools.chute.order import (
 from chute_ros.tools.chute.reach import warning
 from chute_ros.tools.chute.session import Session, opened
 from chute_ros.tools.chute.status_text import order_lines
+from chute_ros.tools.streams import NotPrintedError
 
 #: A person who is asked does not wait longer for the state, nor for a node of it, s.
 _SHOWN_WITHIN = 2.0
@@ -56,10 +58,13 @@ def main(chosen: Chosen) -> int:
             raise
         if listening is not None and not (warned or answer.success):
             _warn(order, listening)
-    if chosen.json:
-        print(json_text(_told(order, chosen.namespace, answer)))
-    else:
-        print(answer_text(order, answer))
+    try:
+        told = json_text(_told(order, chosen.namespace, answer)) if chosen.json else ""
+        print(told or answer_text(order, answer), flush=True)
+    except NotPrintedError as error:
+        # The order was carried out or not, whoever reads of it.
+        error.instead = plain(answer_text(order, answer))
+        raise
     return answer.code
 
 
