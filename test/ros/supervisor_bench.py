@@ -6,6 +6,7 @@ import itertools
 
 from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, SafetyState, VehicleState
 from chute_msgs.srv import Arm
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from node_bench import stamped
 from rclpy.node import Node
 
@@ -32,6 +33,8 @@ class StubLink(Node):
         self.flying = False
         #: It tells of the vehicle.
         self.telling = True
+        #: It sends diagnostics; a hung one does not.
+        self.diagnosing = True
         #: It does not hear decisions.
         self.deaf = False
         #: Numbers of the decisions that it acted on.
@@ -43,6 +46,8 @@ class StubLink(Node):
         self._reports = self.create_publisher(ActionReport, "safety/action", qos.DECISION)
         self.create_subscription(SafetyDecision, "safety/decision", self._decision, qos.DECISION)
         self.create_timer(0.05, self._beat)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", qos.STATUS)
+        self.create_timer(1.0, self._diagnose)
 
     def offer_arming(self):
         self.create_service(Arm, "~/arm", self._arm)
@@ -58,6 +63,12 @@ class StubLink(Node):
             self._beats.publish(stamped(self, message))
         if self.telling:
             self._tell_vehicle()
+
+    def _diagnose(self):
+        if self.diagnosing:
+            name = f"{self.get_namespace()}/{self.get_name()}: stub".lstrip("/")
+            status = DiagnosticStatus(level=DiagnosticStatus.OK, name=name, message="is open")
+            self._diagnostics.publish(stamped(self, DiagnosticArray(status=[status])))
 
     def _tell_vehicle(self):
         vehicle = VehicleState(

@@ -494,6 +494,28 @@ def test_healthy_diagnostics_are_well(ready):
     assert code == 0
 
 
+@pytest.mark.parametrize("beating", [True, False])
+def test_a_node_that_sends_no_diagnostics_is_told(ready, beating):
+    """It hangs, or hung before this command began: then the supervisor alone says it should be."""
+    ready.link.diagnosing, ready.link.beating = False, beating
+    ready.bench.until(lambda: beating or ready.states[-1].link_states[0] == LinkState.LOST, "lost")
+    code, out, _ = run(ready.bench, "diagnostics", "--timeout", "4")
+    assert code == 1
+    place = f"{ready.bench.namespace}/mavlink_parachute".lstrip("/")
+    told = f"STALE  {place}: diagnostics: nothing received within 4 s (never received)"
+    assert told in out.splitlines()
+    code, out, _ = run(ready.bench, "doctor", "--timeout", "4")
+    assert code == 1
+    assert "WRONG  mavlink_parachute: no diagnostics: nothing received within 4 s -> " in out
+
+
+def test_a_node_that_is_gone_is_told_with_the_parameters(ready):
+    ready.bench.remove(ready.link)
+    code, out, err = run(ready.bench, "parameters", "--timeout", "4")
+    assert (code, out.splitlines()[0]) == (1, "safety_supervisor")
+    assert err == "chute: mavlink_parachute did not answer within 4 s\n"
+
+
 def test_parameters_show_what_differs_from_the_default(ready):
     code, out, _ = run(ready.bench, "parameters", "safety_supervisor")
     lines = out.splitlines()
@@ -543,7 +565,10 @@ def test_without_a_black_box_it_says_so(bench):  # noqa: F811
     Scene(bench, black_box=False).await_stage(SafetyState.READY)
     code, out, err = run(bench, "record")
     assert (code, out) == (1, "")
-    assert "its parameter black_box is false (nodes received: safety_supervisor)" in err
+    assert (
+        "its parameter black_box is false (nodes received: mavlink_parachute, safety_supervisor)"
+        in err
+    )
 
 
 # What others may send, and what a shell may do

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,7 +19,7 @@ MOST_TASKS = 500
 
 @dataclass(frozen=True)
 class Task:
-    """One task of one node. age: since it was received, s."""
+    """One task of one node. age: since it was received, s; NaN: its node sent none."""
 
     name: str
     level: str
@@ -32,9 +33,21 @@ class Task:
         return self.name.partition(": ")[0].rpartition("/")[2]
 
     @property
+    def received(self) -> bool:
+        """Its node sent it."""
+        return not math.isnan(self.age)
+
+    @property
     def task(self) -> str:
         """Its name in its node."""
         return self.name.partition(": ")[2]
+
+
+def silent_task(node: str, seconds: float) -> Task:
+    """That of a node that should send some and sent none within seconds: it hangs, has died or
+    never was started."""
+    message = f"nothing received within {seconds:g} s"
+    return Task(f"{node}: diagnostics", "STALE", message, {}, math.nan)
 
 
 @dataclass

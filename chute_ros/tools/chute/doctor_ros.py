@@ -34,7 +34,7 @@ def vehicle_findings(namespace: str, seconds: float) -> tuple[list[Finding], str
         if not session.until(lambda: listening.picture.heartbeats, seconds):
             nothing = session.looked_for("no node is received", seconds)
             return [Finding(WRONG, nothing, _START)], ""
-        tasks = gather(session, seconds)
+        tasks = gather(session, seconds, listening)
         found = supervisor_findings(listening.picture, namespace)
         graph = session.node.get_node_names_and_namespaces()
         found += namesake_findings(graph, namespace)

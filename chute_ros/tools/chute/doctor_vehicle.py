@@ -98,18 +98,22 @@ def version_findings(picture: Picture, tasks: Sequence[Task], here: str) -> list
 def task_findings(tasks: Sequence[Task]) -> list[Finding]:
     """What the nodes themselves report as wrong."""
     bad = [one for one in tasks if one.level in ("ERROR", "STALE", "WARN")]
-    found = [
-        Finding(
-            NOTE if one.level == "WARN" else WRONG,
-            f"{one.node} reports {one.level}: {one.task}: {one.message}",
-            f"`chute diagnostics --all` shows its values{_page(one)}",
-        )
-        for one in bad[:MOST_TASKS_SHOWN]
-    ]
+    found = [_task_finding(one) for one in bad[:MOST_TASKS_SHOWN]]
     if len(bad) > MOST_TASKS_SHOWN:
         left_out = len(bad) - MOST_TASKS_SHOWN
         found.append(Finding(WRONG, f"{left_out} more", "`chute diagnostics` lists them"))
     return found or [Finding(OK, f"diagnostics: {len(tasks)} tasks, none reports a fault")]
+
+
+def _task_finding(one: Task) -> Finding:
+    if not one.received:
+        remedy = "it hangs, has died or was never started: look at its log, and start it again"
+        return Finding(WRONG, f"{one.node}: no {one.task}: {one.message}", remedy)
+    return Finding(
+        NOTE if one.level == "WARN" else WRONG,
+        f"{one.node} reports {one.level}: {one.task}: {one.message}",
+        f"`chute diagnostics --all` shows its values{_page(one)}",
+    )
 
 
 def _page(task: Task) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import sys
 
 from chute_ros.tools.chute.defaults import defaults_for
+from chute_ros.tools.chute.gathering import expected
+from chute_ros.tools.chute.hearing import Picture
 from chute_ros.tools.chute.json_text import json_text
+from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.node_parameters import nodes, parameters_of_node
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
 from chute_ros.tools.chute.parameter_list import Given, given, parameter_lines
-from chute_ros.tools.chute.session import opened
+from chute_ros.tools.chute.session import Session, opened
 
 
 def main(chosen: Chosen) -> int:
@@ -18,10 +21,16 @@ def main(chosen: Chosen) -> int:
     told: dict[str, list[Given]] = {}
     silent: list[str] = []
     with opened(chosen.namespace) as session:
+        listening = Listening(session)
         found = nodes(session, chosen.more.node, within)
         if not found:
             what = f"node {chosen.more.node}" if chosen.more.node else "node that sends heartbeats"
             raise session.not_heard(f"no {what} is found", within)
+        if chosen.more.node is None:
+            # One that hangs, or is not there, is found by what the supervisor says of it alone.
+            session.until(lambda: _all_found(session, listening.picture), within)
+            found = session.links()
+            silent = sorted(expected(listening.picture) - {*found})
         for node in found:
             values = parameters_of_node(session, node, within)
             if values is None:
@@ -37,3 +46,8 @@ def main(chosen: Chosen) -> int:
         for node, parameters in told.items():
             print("\n".join(parameter_lines(node, parameters)))
     return NOT_WELL if silent else DONE
+
+
+def _all_found(session: Session, picture: Picture) -> bool:
+    """Every node that the vehicle should have."""
+    return bool(picture.states) and expected(picture) <= {*session.links()}

@@ -28,7 +28,7 @@ def main(chosen: Chosen) -> int:
         if one.task == BLACK_BOX
     ]
     if not boxes:
-        nodes = ", ".join(sorted({one.node for one in tasks}))
+        nodes = ", ".join(sorted({one.node for one in tasks if one.received}))
         raise CommandError(
             f"no black box in {chosen.namespace}: the supervisor is not received, or its "
             f"parameter black_box is false (nodes received: {nodes})"
