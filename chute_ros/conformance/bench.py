@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from chute_ros.conformance.clause import Packet, Trial, Wait
+from chute_ros.conformance.clause import Packet, Risk, Trial, Wait
 from chute_ros.errors import ChuteError
 
 
@@ -28,9 +28,13 @@ HeardT = TypeVar("HeardT", bound=HeardPacket)
 
 
 class RecordingBench(Generic[HeardT]):
-    """heard: of the device, in their order; watched: what the last watch saw."""
+    """heard: of the device, in their order; watched: what the last watch saw. risk: the highest
+    that the person allows."""
 
-    def __init__(self) -> None:
+    def __init__(self, risk: Risk = Risk.NONE) -> None:
+        self.allowed = risk
+        #: The highest risk of all that was done to the device so far.
+        self.done = Risk.NONE
         self.now, self.heard_at = 0.0, -math.inf
         self.traffic: list[Packet] = []
         self.heard: list[HeardT] = []
@@ -50,6 +54,12 @@ class RecordingBench(Generic[HeardT]):
         if 0.0 < self._up - since_start < wraps / 2.0:
             self.starts += 1
         self._up = since_start
+
+    def takes(self, risk: Risk, what: str) -> None:
+        """What is about to be done to the device has this risk; NotAllowedError: it must not."""
+        if risk > self.allowed:
+            raise NotAllowedError(f"{what} needs {risk.name}, allowed is {self.allowed.name}")
+        self.done = max(self.done, risk)
 
     def noted(self, sent: bool, sender: str, name: str, text: str, raw: bytes) -> Packet:
         """Remember what was sent or received."""

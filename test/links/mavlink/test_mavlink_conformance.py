@@ -213,6 +213,19 @@ def test_an_abort_leaves_the_device_disarmed() -> None:
     assert run.session.take_events() == []
 
 
+def test_a_device_that_was_sent_nothing_that_arms_is_not_disarmed() -> None:
+    """Given one that falls silent before the first such command, though it is allowed."""
+    device = sound()
+    run = Run(device)
+    run.to(lambda: bool(run.results))
+    device.act("silent")
+    run.to()
+    assert run.problem.startswith("the device fell silent")
+    assert "PARACHUTE_STATUS" not in run.problem
+    sent = [one.text for one in run.session.bench.traffic if one.sent]
+    assert not any(f"command={dialect.MAV_CMD_SET_PARACHUTE_ARM}" in one for one in sent)
+
+
 def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     """Given one that stops to answer, armed."""
     run = Run(sound())

@@ -308,6 +308,28 @@ def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     assert run.problem.startswith(f"aborted by Ctrl-C; {left}")
 
 
+def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed() -> None:
+    """Given one that falls silent before the first such command, though it is allowed."""
+    device = sound()
+    run = Run(device)
+    run.to(lambda: bool(run.results))
+    device.act("silent")
+    run.to()
+    assert run.problem.startswith("the device fell silent")
+    assert "LEFT" not in run.problem
+
+
+def test_a_device_that_vanishes_without_heartbeats_may_be_left_with_open_valves() -> None:
+    """Given one that falls silent while it is tried how long the connection lasts: some open the
+    SV then."""
+    device = sound()
+    run = Run(device, Risk.ARMS, ())
+    run.to(lambda: not run.session.bench.beats)
+    device.act("silent")
+    run.to()
+    assert "its valves open: no telemetry shows it" in run.problem
+
+
 def test_a_device_whose_state_cannot_be_seen_is_named() -> None:
     """Given one that falls silent while a valve is open."""
     device = sound()

@@ -181,6 +181,27 @@ def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk)
     assert max(one.risk for one in tried) == risk
 
 
+@pytest.mark.parametrize("risk", list(Risk))
+def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed(risk: Risk) -> None:
+    """Given one that vanishes with a harmless parameter changed."""
+    run = Run(risk)
+    run.line.run(lambda: bool(run.bench.changed))
+    run.controller.act("silent")
+    run.line.run()
+    assert f"{p.NODE_STATUS_INTERVAL} is not" in problem(run.line)
+    assert "ARMED" not in problem(run.line)
+    asked = [one for one in run.bench.traffic if one.sent and names.PARACHUTE_SERVICE in one.name]
+    assert asked == []
+
+
+def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
+    run = Run(Risk.ARMS)
+    run.line.run(lambda: run.controller.state is ParachuteState.ARMED)
+    run.controller.act("silent")
+    run.line.run()
+    assert "it may be LEFT ARMED: no ParachuteStatus shows it" in problem(run.line)
+
+
 def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
     run = Run(Risk.ARMS)
     run.line.run(lambda: run.controller.state is ParachuteState.ARMED)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench
+from chute_ros.conformance.bench import HeardPacket, RecordingBench
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
@@ -58,10 +58,10 @@ class MavlinkBench(RecordingBench[Heard]):
         key: tuple[Signer, Verifier] | None = None,
         soak: float = 0.0,
     ) -> None:
-        super().__init__()
+        super().__init__(risk)
         self.soak = soak
         self.system = self.component = 0
-        self._risk, self._wanted, self._key = risk, component, key
+        self._wanted, self._key = component, key
         self._every: list[Heard] = []
         self._decoders: dict[Hashable, FrameDecoder] = {}
         #: Of each sender, that signs or does not.
@@ -120,9 +120,7 @@ class MavlinkBench(RecordingBench[Heard]):
         signed: bool = True,
     ) -> None:
         """Send a message as this component. change: what becomes of its frame on the way."""
-        risk = _risk_of(message)
-        if risk > self._risk:
-            raise NotAllowedError(f"{message} needs {risk.name}, allowed is {self._risk.name}")
+        self.takes(_risk_of(message), str(message))
         frame = self._packed(message, (self.system, sender), version, signed)
         for piece in change(frame):
             self._noted(message, f"{self.system}/{sender}", True, piece)
@@ -213,7 +211,7 @@ class MavlinkBench(RecordingBench[Heard]):
 
     def leave(self) -> Trial:
         """Each trigger is disarmed, and its status says so."""
-        if self._risk is Risk.NONE or not self.component:
+        if self.done is Risk.NONE:
             return "nothing was armed"
         yield from self.command(ARM, 0, EVERY)
         status = yield from self.status()

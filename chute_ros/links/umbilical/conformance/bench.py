@@ -13,7 +13,7 @@ from typing import Any
 from chute_ros.conformance.bench import HeardPacket, RecordingBench
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.errors import ParameterError
-from chute_ros.links.umbilical.conformance.permits import check
+from chute_ros.links.umbilical.conformance.permits import check_options, risk_of
 from chute_ros.links.umbilical.protocol.commands import KINDS, set_target
 from chute_ros.links.umbilical.protocol.fields import Value, convert, problem_of
 from chute_ros.links.umbilical.protocol.layouts import Layout, Problem
@@ -98,13 +98,13 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         options: Collection[str] = (),
         soak: float = 0.0,
     ) -> None:
-        super().__init__()
+        super().__init__(risk)
         self.layout, self.soak, self.beats = layout, soak, True
         #: What one clause has watched and others look at as well.
         self.kept: dict[str, Watch] = {}
         #: Bytes that end a line besides its newline.
         self.returns: list[Packet] = []
-        self._risk, self._options = risk, options
+        self._options = options
         self._reader = StreamReader(self._is_telemetry, Counter())
         self._is_found = self._began_within_line = False
         self._target_before: tuple[Value, ...] | None = None
@@ -190,7 +190,8 @@ class UmbilicalBench(RecordingBench[HeardLine]):
 
     def write(self, data: bytes) -> Trial:
         """Write these bytes at once, as soon as the write before is long enough ago."""
-        check(data, self._risk, self._options)
+        check_options(data, self.allowed, self._options)
+        self.takes(risk_of(data), repr(data))
         while self.now < self._free_at:
             yield Wait(self._free_at)
         self._write(data)
@@ -254,30 +255,29 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         """Key disarmed, valves closed, not in flight, the target as it was."""
         if not self._is_found:
             return "nothing was sent"
-        if self._risk is not Risk.NONE:
-            yield from self._make_safe()
-        left = yield from self._left()
+        left = []
+        if self.done is not Risk.NONE:
+            yield from self._make_safe(self.done is Risk.FIRES)
+            left = yield from self._left()
         if self._target_before is not None and not (yield from self._aim_back()):
             left.append("its target is not set back")
         if left:
             raise failed(f"the device: {'; '.join(left)}")
         return "as it was"
 
-    def _make_safe(self) -> Trial:
+    def _make_safe(self, may_have_fired: bool) -> Trial:
         yield from self.order("key_disarm", lambda one: one.values.get("flight_mode") == 0)
-        if self._risk is Risk.FIRES or self._open_valves():
+        if may_have_fired or self._open_valves():
             yield from self.order("safe", closed)
             for valve in self._open_valves():
                 name = valve.removesuffix("_open")
                 yield from self.order(f"close_{name}", partial(closed, valves=(valve,)))
-        if self._risk is Risk.FIRES and self.last("flight_mode") != 0:
+        if may_have_fired and self.last("flight_mode") != 0:
             yield from self.restart()
         return ""
 
     def _left(self) -> Any:
         """What is not as it must be, in words."""
-        if self._risk is Risk.NONE:
-            return []
         if (yield from self.wait_for(TELEM, PAUSE, lambda one: bool(one.values))) is None:
             return ["it may be LEFT ARMED, and its valves open: no telemetry shows it"]
         mode = self.last("flight_mode")

@@ -85,6 +85,7 @@ def _heartbeat(bench: UmbilicalBench) -> Trial:
 def _unheard(bench: UmbilicalBench) -> Any:
     """A while (Watch), after a last heartbeat, in which none is sent."""
     if "unheard" not in bench.kept:
+        bench.takes(Risk.ARMS, "a while without <H>")
         yield from bench.write(HEARTBEAT.token)
         bench.beats = False
         try:

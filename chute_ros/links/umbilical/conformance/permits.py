@@ -36,15 +36,18 @@ def _permit(name: str) -> _Permit:
 _BY_TOKEN = {kind.command.token: _permit(name) for name, kind in KINDS.items()}
 
 
-def check(data: bytes, risk: Risk, options: Collection[str]) -> None:
-    """NotAllowedError: data needs more than this.
+def risk_of(data: bytes) -> Risk:
+    """What a device may do that gets these bytes.
 
     Bytes that are no command count as the most dangerous command that a device could read into
     them that is careless of brackets and of case.
     """
+    return max((permit.risk for permit in _permits(data)), default=Risk.NONE)
+
+
+def check_options(data: bytes, risk: Risk, options: Collection[str]) -> None:
+    """NotAllowedError: data needs an option that is not among these. risk: what is allowed."""
     for permit in _permits(data):
-        if permit.risk > risk:
-            raise NotAllowedError(f"{data!r} needs {permit.risk.name}, allowed is {risk.name}")
         # Whoever lets it fire lets it start again as well: nothing else ends a launch.
         if permit.option == REBOOT and risk is Risk.FIRES:
             continue

@@ -64,7 +64,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         soak: float = 0.0,
         dna: bool = False,
     ) -> None:
-        super().__init__()
+        super().__init__(risk)
         self.definitions, self.soak, self.node = definitions, soak, 0
         #: Of everybody, triggers as well.
         self.every: list[HeardTransfer] = []
@@ -74,7 +74,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.deployed_from = -1
         #: Gives out node ids, while it shall.
         self.allocator, self.gives_out = Allocator({}, (vehicle,)), dna
-        self._risk, self._wanted, self._dna = risk, node, dna
+        self._wanted, self._dna = node, dna
         #: Its node id as it was found, and all that it has had.
         self._home, self._ids = 0, {0}
         self._endpoint = Endpoint(definitions.types, vehicle)
@@ -210,9 +210,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
                     return
                 raise NotAllowedError(f"{named} needs {DNA}")
             risk = Risk.NONE if named in _HARMLESS else Risk.ARMS
-        if risk > self._risk:
-            text = f"{service} {dict(values)}"
-            raise NotAllowedError(f"{text} needs {risk.name}, allowed is {self._risk.name}")
+        self.takes(risk, f"{service} {dict(values)}")
 
     def _type_of(self, service: str, number: int) -> str:
         """Whatever the magic number is."""
@@ -266,7 +264,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def leave(self) -> Trial:
         """Not armed, and its parameters as they were."""
-        if not self.node or (self._risk is Risk.NONE and not self.changed):
+        may_be_armed = self.done is not Risk.NONE
+        if not self.node or not (may_be_armed or self.changed):
             return "nothing was changed"
         left = []
         if p.STATIC_NODE_ID in self.changed:
@@ -274,20 +273,25 @@ class UpfBench(RecordingBench[HeardTransfer]):
             if not (yield from self.static_again()):
                 left.append(f"{p.STATIC_NODE_ID} is LEFT 0: a node id must be given to it")
                 self.changed.pop(p.STATIC_NODE_ID, None)
-        if self._risk is not Risk.NONE:
+        if may_be_armed:
             for name in ("TYPE_DISARM", "TYPE_LAND"):
                 yield from self.ask(name)
         for name, value in [*self.changed.items()]:
             if not (yield from self.put_back(name)):
                 left.append(f"{name} is not {p.words(value)} again")
-        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
-        if status is None:
-            left.append("it may be LEFT ARMED: no ParachuteStatus shows it")
-        elif self.definitions.state(status.values["state"]) is ParachuteState.ARMED:
-            left.append("it is LEFT ARMED")
+        if may_be_armed:
+            left += yield from self._left_armed()
         if left:
             raise failed(f"the device: {'; '.join(left)}")
         return "as it was"
+
+    def _left_armed(self) -> Any:
+        """In words, by its own state."""
+        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
+        if status is None:
+            return ["it may be LEFT ARMED: no ParachuteStatus shows it"]
+        armed = self.definitions.state(status.values["state"]) is ParachuteState.ARMED
+        return ["it is LEFT ARMED"] if armed else []
 
     def ask(self, type_name: str) -> Any:
         """The name of the result of a ParachuteService request; None: not answered."""
