@@ -22,6 +22,7 @@ from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
+from chute_ros.links.upf.protocol.devices import OPERATIONAL, mode_name
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan import time_sync
 
@@ -77,6 +78,21 @@ def _node_status(bench: UpfBench) -> Trial:
             f"NodeStatus pauses for {longest:.2f} s (need at most 1)", bench.packets(NODE_STATUS)
         )
     return f"each {_mean(bench, NODE_STATUS):.2f} s"
+
+
+def _node_mode(bench: UpfBench) -> Trial:
+    yield from bench.watch_once(WATCHED)
+    if not (told := _node_statuses(bench)):
+        raise not_tried("no NodeStatus came")
+    # It may tell its state before the NodeStatus that goes with it.
+    since = told[-1].at - _LONGEST_STATUS * (1.0 + _SHARE)
+    not_ready = bench.definitions.state_number(ParachuteState.NOT_READY)
+    states = (one for one in bench.heard if one.kind == names.PARACHUTE_STATUS and one.at >= since)
+    if any(one.values["state"] == not_ready for one in states):
+        raise not_tried("it was NOT_READY a moment before")
+    if (mode := told[-1].values["mode"]) != OPERATIONAL:
+        raise failed(f"NodeStatus reports mode {mode_name(mode)}", [told[-1].packet])
+    return mode_name(mode)
 
 
 def _node_id(bench: UpfBench) -> Trial:
@@ -376,6 +392,13 @@ _NODE, _STANDARD = "Node discovery", "Standard UAVCAN protocols"
 _PARAMETERS, _STATES = "Parameters", "Global working state"
 CLAUSES: tuple[UpfClause, ...] = (
     clause(_STANDARD, "node-status", "NodeStatus is broadcast", _node_status, READS),
+    clause(
+        _STANDARD,
+        "node-mode",
+        "NodeStatus has mode OPERATIONAL while it is not NOT_READY",
+        _node_mode,
+        READS,
+    ),
     clause(_STANDARD, "uptime", "NodeStatus tells the time since its start", _uptime, READS),
     clause(
         "UPF protocols",

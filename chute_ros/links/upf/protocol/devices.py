@@ -27,6 +27,15 @@ from chute_ros.model import (
 from chute_ros.protocol.liveness import DeviceTracker, LinkChange
 
 _HEALTH = ("OK", "WARNING", "ERROR", "CRITICAL")
+#: Modes of NodeStatus.
+OPERATIONAL, _INITIALIZATION = 0, 1
+_MODES = {
+    OPERATIONAL: "OPERATIONAL",
+    _INITIALIZATION: "INITIALIZATION",
+    2: "MAINTENANCE",
+    3: "SOFTWARE_UPDATE",
+    7: "OFFLINE",
+}
 #: Errors of ours that have a name among the flags of the MAVLink parachute protocol.
 _FLAGS = {
     "IMU": ErrorFlags.IMU_ERROR,
@@ -35,6 +44,11 @@ _FLAGS = {
     "LOW_POWER": ErrorFlags.LOW_POWER,
     "VEHICLE_CONNECTION": ErrorFlags.FC_CONNECTION_ERROR,
 }
+
+
+def mode_name(mode: int) -> str:
+    """A mode of NodeStatus; one without a name by its number."""
+    return _MODES.get(mode, str(mode))
 
 
 class Device(DeviceTracker):
@@ -52,6 +66,7 @@ class Device(DeviceTracker):
         self.values: Mapping[str, Any] = {}
         self.uptime = math.nan  # s, by NodeStatus
         self._health = 0
+        self._mode = OPERATIONAL
 
     @property
     def device(self) -> str:
@@ -60,7 +75,7 @@ class Device(DeviceTracker):
 
     def node_status(self, values: Mapping[str, Any], now: float) -> list[LinkChange]:
         """A NodeStatus of the device."""
-        self._health = values["health"]
+        self._health, self._mode = values["health"], values["mode"]
         self.uptime = float(values["uptime_sec"])
         return self.liveness.heard(now)
 
@@ -80,7 +95,7 @@ class Device(DeviceTracker):
         return self.liveness.state in (LinkState.OK, LinkState.STALE)
 
     def link_faults(self, now: float, name: str) -> list[str]:
-        """What is wrong of link, health and status stream."""
+        """What is wrong of link, health, mode and status stream."""
         faults = []
         if self.liveness.state in (LinkState.STALE, LinkState.LOST):
             silence = self.liveness.age(now)
@@ -89,14 +104,21 @@ class Device(DeviceTracker):
             )
         if self._health:
             faults.append(f"NodeStatus of {self.node_id} reports {_HEALTH[self._health]}")
+        if self._mode != OPERATIONAL:
+            faults.append(f"NodeStatus of {self.node_id} reports mode {mode_name(self._mode)}")
         if self.overdue(now):
             faults.append(f"{name} {now - self.status_received:.1f} s old")
         return faults
 
     @property
     def unhealthy(self) -> bool:
-        """By its NodeStatus: ERROR or CRITICAL."""
-        return self._health >= 2
+        """By its NodeStatus: ERROR or CRITICAL, or a mode in which it does not work."""
+        return self._health >= 2 or self._mode not in (OPERATIONAL, _INITIALIZATION)
+
+    @property
+    def starting(self) -> bool:
+        """By its NodeStatus, which after a start may still say so when its status is READY."""
+        return self._mode == _INITIALIZATION
 
     def number(self, field: str) -> float:
         """A measured value; NaN: not told."""
@@ -165,7 +187,7 @@ class Trigger(Device):
         whole = not self.definitions.faults(names.TRIGGER_STATUS, self.values)
         heard = self.liveness.state is LinkState.OK and not self._overdue
         able = self.state in ("", "READY") and not self.launched and not self.doubted
-        return heard and whole and able and not self.unhealthy
+        return heard and whole and able and not (self.unhealthy or self.starting)
 
     def faults(self, now: float) -> list[str]:
         """What is wrong, in words."""
@@ -180,6 +202,8 @@ class Trigger(Device):
         """The picture of a parachute that has no controller."""
         by_name = {"NOT_READY": ParachuteState.NOT_READY, "READY": ParachuteState.READY}
         state = by_name.get(self.state, ParachuteState.UNKNOWN)
+        if self.starting:
+            state = ParachuteState.NOT_READY
         if self.state == "ABNORMAL" or self.overdue(now) or self.unhealthy:
             state = ParachuteState.ABNORMAL
         if self.launched:
@@ -297,4 +321,4 @@ class Controller(Device):
             return self.state
         if self.overdue(now) or self.unhealthy or self.never_deploys:
             return ParachuteState.ABNORMAL
-        return self.state
+        return ParachuteState.NOT_READY if self.starting else self.state

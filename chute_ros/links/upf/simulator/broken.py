@@ -208,8 +208,17 @@ def _interval(
 
 
 def _no_uptime(device: BrokenController) -> None:
+    _node_status(device, uptime_sec=7)
+
+
+def _updates_for_ever(device: BrokenController) -> None:
+    _node_status(device, mode=3)
+
+
+def _node_status(device: BrokenController, **told: int) -> None:
+    """Its NodeStatus tells this."""
     interval, make = device.broadcasts[NODE_STATUS]
-    device.broadcasts[NODE_STATUS] = (interval, lambda: {**make(), "uptime_sec": 7})
+    device.broadcasts[NODE_STATUS] = (interval, lambda: {**make(), **told})
 
 
 def _no_id(_: BrokenController, request: Heard, answer: Any) -> Answer:
@@ -270,6 +279,7 @@ def _pace(device: BrokenController, name: str) -> float:
 
 _CHANGES: dict[str, Callable[[BrokenController], None]] = {
     "node-status": _interval(NODE_STATUS, lambda device: _pace(device, p.NODE_STATUS_INTERVAL)),
+    "node-mode": _updates_for_ever,
     "uptime": _no_uptime,
     "status-interval": _interval(
         names.PARACHUTE_STATUS, lambda device: _pace(device, p.PARACHUTE_STATUS_INTERVAL)

@@ -88,6 +88,46 @@ def test_health_of_its_node_status_counts(bench):
         assert picture.uptime == 5.0
 
 
+@pytest.mark.parametrize(
+    ("mode", "name", "state"),
+    [
+        (1, "INITIALIZATION", S.NOT_READY),
+        (2, "MAINTENANCE", S.ABNORMAL),
+        (3, "SOFTWARE_UPDATE", S.ABNORMAL),
+        (5, "5", S.ABNORMAL),
+        (7, "OFFLINE", S.ABNORMAL),
+    ],
+)
+def test_mode_of_its_node_status_counts(bench, mode, name, state):
+    """A mode other than OPERATIONAL; a device that initialises is not ready yet."""
+    story = bench("").status("READY").node_status(mode=mode)
+    assert f"NodeStatus of 33 reports mode {name}" in story.picture().faults
+    assert story.picture().state is state
+    assert not story.picture().healthy
+    assert story.node_status(mode=0).picture().faults == ()
+    assert story.picture().healthy
+
+
+def test_trigger_in_another_mode_than_operational_is_not_sound(bench):
+    story = bench("").status("READY").trigger_status("READY").node_status(34, mode=7)
+    trigger = story.link.devices.trigger()
+    assert not trigger.sound
+    assert "NodeStatus of 34 reports mode OFFLINE" in trigger.faults(story.now)
+    alone = bench("", without_controller=True).trigger_status("READY").node_status(34, mode=3)
+    assert alone.picture().state is S.ABNORMAL
+    assert alone.node_status(34, mode=1).picture().state is S.NOT_READY
+    assert alone.node_status(34, mode=0).picture().healthy
+
+
+def test_restart_does_not_flap(bench):
+    """Given a controller that tells READY before its next NodeStatus leaves INITIALIZATION."""
+    story = bench("").node_status(uptime=0, mode=1).status("NOT_READY").status("READY")
+    story.node_status(uptime=1, mode=0).status("READY")
+    states = [one.state for one in story.pictures()]
+    assert S.ABNORMAL not in states
+    assert states[-1] is S.READY
+
+
 def test_picture_of_an_armed_controller(bench):
     story = bench("").status("ARMED", height_of_home=40.5, backup_power_voltage=8.0)
     picture = story.picture()

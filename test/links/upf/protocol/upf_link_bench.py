@@ -237,9 +237,9 @@ class Bench:
             self.trigger_status("LAUNCHED", node_id)
         return self
 
-    def node_status(self, node_id=CONTROLLER, uptime=5, health=0):
+    def node_status(self, node_id=CONTROLLER, uptime=5, health=0, mode=0):
         """A NodeStatus."""
-        values = {"uptime_sec": uptime, "health": health}
+        values = {"uptime_sec": uptime, "health": health, "mode": mode}
         return self.say(node_id, "uavcan.protocol.NodeStatus", **values)
 
     def ask(self, type_name, node_id=CONTROLLER, number=0, **values):
