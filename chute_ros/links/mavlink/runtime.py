@@ -71,7 +71,7 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         if not self.settings.expect_parachute:
             reasons = [*autopilot, *doubts]
             return Summary(vehicle.link_state, not reasons, vehicle.armed_age, tuple(reasons))
-        chosen = link.chosen_parachute()
+        chosen = link.chosen_parachute(now)
         state, age, reasons = LinkState.NEVER_SEEN, NAN, [_NO_PARACHUTE]
         if chosen is not None:
             state, age = chosen.liveness.state, chosen.liveness.age(now)

@@ -112,25 +112,38 @@ class Devices(EventLog):
 
     # -- who -------------------------------------------------------------------------------------
 
-    def chosen_parachute(self) -> ParachuteTracker | None:
-        """Device for requests without a device: the first that is not lost, or the first."""
-        return first_alive(self.parachutes.all())
+    def chosen_parachute(self, now: float) -> ParachuteTracker | None:
+        """Device for requests without a device: the first that is healthy, or is not lost, or the
+        first."""
+        return next(iter(self._in_order(now)), None)
 
-    def target(self, device: str) -> ParachuteTracker | None:
+    def target(self, device: str, now: float) -> ParachuteTracker | None:
         """The parachute with this name; empty: the chosen one."""
-        return self.parachutes.named(device) if device else self.chosen_parachute()
+        return self.parachutes.named(device) if device else self.chosen_parachute(now)
 
-    def to_release(self, device: str) -> ParachuteTracker | None:
-        """Where a release goes; device: its name, or empty. As long as no heartbeat of a parachute
-        was heard, to the one that says what only a parachute does, if all that do are of one
-        system: heartbeats come once a second, and after a restart of ours the ground may come
-        before the next that is whole."""
+    def to_release(self, device: str, now: float) -> list[ParachuteTracker]:
+        """Where a release goes, and where to if that one does not do it; device: its name, or
+        empty. As long as no heartbeat of a parachute was heard, to the one that says what only a
+        parachute does, if all that do are of one system: heartbeats come once a second, and after
+        a restart of ours the ground may come before the next that is whole."""
         if self.parachutes.all():
-            return self.target(device)
-        if len({system_id for system_id, _ in self._unproven}) != 1:
-            return None
-        fitting = (one for one in self._unproven.values() if device in ("", one.device))
-        return next(fitting, None)
+            return [one for one in self._in_order(now) if device in ("", one.device)]
+        if not self.can_release():
+            return []
+        return [one for one in self._unproven.values() if device in ("", one.device)][:1]
+
+    def can_release(self) -> bool:
+        """A parachute that a release would go to was received."""
+        return bool(self.parachutes.all()) or len({system for system, _ in self._unproven}) == 1
+
+    def _in_order(self, now: float) -> list[ParachuteTracker]:
+        """Our parachutes as they are turned to: healthy ones, others that are heard, lost ones;
+        among equals whichever was heard first."""
+
+        def rank(one: ParachuteTracker) -> tuple[bool, bool]:
+            return one.liveness.state is LinkState.LOST, not one.status(now).healthy
+
+        return sorted(self.parachutes.all(), key=rank)
 
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""

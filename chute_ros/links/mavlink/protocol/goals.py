@@ -8,7 +8,7 @@ MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -121,16 +121,25 @@ def set_triggers(
 
 
 def release(
-    parachute: ParachuteTracker, force: bool, now: float, remark: Callable[[], str] = str
+    parachutes: Sequence[ParachuteTracker],
+    force: bool,
+    patience: float,
+    now: float,
+    remark: Callable[[], str] = str,
 ) -> MavlinkGoal:
-    """Release the parachute; with force its triggers for commands are armed on the way, each by
-    itself: a module may refuse a mask with a source that it does not have.
+    """Release the first of these parachutes; with force its triggers for commands are armed on the
+    way, each by itself: a module may refuse a mask with a source that it does not have. The next
+    one follows if it refuses, or has not answered or opened within patience, s.
     remark: what else whoever reads its end must know.
 
     A status from before the order is believed only while the status stream is alive and the device
     not lost: what a lost device said long ago must not keep us from sending.
     """
+    parachute, *others = parachutes
     alive = parachute.liveness.state is not LinkState.LOST and not parachute.overdue(now)
+
+    def next_one() -> MavlinkGoal | None:
+        return release(others, force, patience, now, remark) if others else None
 
     def shown() -> bool:
         return parachute.deployed and (alive or parachute.status_received > now)
@@ -151,6 +160,8 @@ def release(
         urgent=True,
         hint=lambda: _why_not_released(parachute, now if force else math.inf),
         remark=remark,
+        otherwise=next_one,
+        patience=patience,
     )
 
 

@@ -112,7 +112,7 @@ class MavlinkLink:
     def set_triggers(self, token: int, arm: int, select: int, device: str, now: float) -> None:
         """Arm and disarm single trigger sources (masks of TriggerFlags)."""
         if self._may_set(token, arm, select):
-            parachute = self._target(token, device)
+            parachute = self._target(token, device, now)
             if parachute is not None:
                 self._set_triggers(token, arm, select, [parachute], now)
 
@@ -121,7 +121,7 @@ class MavlinkLink:
         or, if all are, of the first."""
         select = triggers or int(self.config.default_triggers)
         mask = select if arm else 0
-        if self._may_set(token, mask, select) and self._target(token, "") is not None:
+        if self._may_set(token, mask, select) and self._target(token, "", now) is not None:
             targets, known = self._devices.to_arm(), self.parachutes.all()
             lost = ", ".join(one.device for one in known if one not in targets)
             remark = f"LOST, and nothing was sent to it: {lost}" if lost else ""
@@ -139,16 +139,19 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
-        parachute = self._devices.to_release(device) or self._target(token, device)
+        found = self._devices.to_release(device, now)
         # One on the autopilot itself may be known to nobody here; a name that does not exist is a
         # caller's mistake.
-        if parachute is not None or not device:
+        if found or not device:
             self._deploy_decided_in = self._devices.arming_count()
-        if parachute is not None:
+        if found:
             self.requests.make_way_for_release(now)
-            self._announcements.ordered(token, f"DEPLOY of {parachute.device}")
-            goal = goals.release(parachute, force, now, self._devices.motors_remark)
+            self._announcements.ordered(token, f"DEPLOY of {found[0].device}")
+            patience = self.config.effect.effect_timeout
+            goal = goals.release(found, force, patience, now, self._devices.motors_remark)
             self._begin(token, goal, now)
+        else:
+            self._target(token, device, now)  # refuses, with the reason
 
     def parachute_action(self, token: int, action: int, device: str, now: float) -> None:
         """MAV_CMD_DO_PARACHUTE: disable 0, enable 1, release 2 (the same as deploy)."""
@@ -158,13 +161,13 @@ class MavlinkLink:
             why = f"MAV_CMD_DO_PARACHUTE has no action {action}; nothing was sent"
             self.requests.refuse(token, why)
         elif action == dialect.PARACHUTE_ENABLE or not self._release_under_way(token):
-            parachute = self._target(token, device)
+            parachute = self._target(token, device, now)
             if parachute is not None:
                 self._begin(token, goals.parachute_action(parachute, action), now)
 
     def request_message(self, token: int, message_id: int, device: str, now: float) -> None:
         """Ask for one message; it comes as data of the RequestFinished."""
-        parachute = self._target(token, device)
+        parachute = self._target(token, device, now)
         if parachute is not None:
             goal, watch = goals.request_message(parachute, message_id)
             self._begin(token, goal, now, watch=watch)
@@ -173,7 +176,7 @@ class MavlinkLink:
         self, token: int, message_id: int, interval_us: int, device: str, now: float
     ) -> None:
         """Set a message's interval and read it back; the MESSAGE_INTERVAL comes as data."""
-        parachute = self._target(token, device)
+        parachute = self._target(token, device, now)
         if parachute is not None:
             goal = goals.set_message_interval(parachute, message_id, interval_us)
             read_back = goals.read_message_interval(parachute, message_id)
@@ -225,7 +228,7 @@ class MavlinkLink:
 
     def has_parachute(self) -> bool:
         """A device that can deploy was received."""
-        return self._devices.to_release("") is not None
+        return self._devices.can_release()
 
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""
@@ -235,9 +238,10 @@ class MavlinkLink:
         """A device that can stop the motors was received."""
         return self.chosen_autopilot() is not None
 
-    def chosen_parachute(self) -> ParachuteTracker | None:
-        """Device for requests without a device: the first that is not lost, or the first."""
-        return self._devices.chosen_parachute()
+    def chosen_parachute(self, now: float) -> ParachuteTracker | None:
+        """Device for requests without a device: the first that is healthy, or is not lost, or the
+        first."""
+        return self._devices.chosen_parachute(now)
 
     def setup(self) -> Setup | None:
         """How our autopilot is set up for a kill and a flight block; None: there is none."""
@@ -339,9 +343,9 @@ class MavlinkLink:
         self.requests.refuse(token, why)
         return True
 
-    def _target(self, token: int, device: str) -> ParachuteTracker | None:
+    def _target(self, token: int, device: str, now: float) -> ParachuteTracker | None:
         """The parachute meant; None, and the request refused, if there is none."""
-        target = self._devices.target(device)
+        target = self._devices.target(device, now)
         if target is None:
             known = ", ".join(p.device for p in self.parachutes.all()) or "none"
             what = f"no parachute {device!r}" if device else "no parachute"

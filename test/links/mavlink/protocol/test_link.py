@@ -52,11 +52,54 @@ def test_several_parachutes_at_once():
 
 def test_without_a_name_the_first_parachute_that_is_not_lost_is_meant():
     bench = Bench().hear(CHUTE, heartbeat()).hear(SECOND, heartbeat())
-    assert bench.link.chosen_parachute().device == "1/161"
+    assert bench.link.chosen_parachute(bench.now).device == "1/161"
     bench.stream(6.0, 1.0, SECOND, heartbeat)
-    assert bench.link.chosen_parachute().device == "1/162"
+    assert bench.link.chosen_parachute(bench.now).device == "1/162"
     bench.at(12.0)
-    assert bench.link.chosen_parachute().device == "1/161"  # both are lost
+    assert bench.link.chosen_parachute(bench.now).device == "1/161"  # both are lost
+
+
+def of_two(**first):
+    """Two on one link, the first one heard like this, the other whole."""
+    return Bench().hear(CHUTE, heartbeat(), status(**first)).hear(SECOND, heartbeat(), status())
+
+
+def told_to(bench):
+    """Who was told to release, in order, each once."""
+    ids = [(one.target_system, one.target_component) for one in bench.commands(RELEASE)]
+    return list(dict.fromkeys(ids))
+
+
+def test_a_release_goes_to_a_parachute_that_is_whole_before_one_that_is_not():
+    bench = of_two(errors=d.PARACHUTE_ERROR_FLAGS_GLOW_WIRE_ERROR)
+    assert bench.link.chosen_parachute(bench.now).device == "1/162"
+    assert told_to(bench.call("deploy", 1, False)) == [SECOND]
+
+
+def test_where_one_refuses_the_next_one_is_released_at_once():
+    bench = of_two().call("deploy", 1, False).at(0.1)
+    bench.hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
+    assert told_to(bench) == [CHUTE, SECOND]
+    bench.at(0.3).hear(SECOND, ack(RELEASE), status(boot_ms=5300, deployed=4))
+    assert bench.end(1).finished.success
+
+
+@pytest.mark.parametrize("acknowledged", [True, False])
+def test_where_one_does_not_open_the_next_one_is_released(acknowledged):
+    bench = of_two().call("deploy", 1, False).at(0.1)
+    if acknowledged:
+        bench.hear(CHUTE, ack(RELEASE))
+    assert told_to(bench.at(0.9)) == [CHUTE]
+    assert told_to(bench.at(1.8)) == [CHUTE, SECOND]
+    bench.at(2.0).hear(SECOND, ack(RELEASE), status(boot_ms=7000, deployed=4))
+    assert bench.end(1).finished.success
+
+
+def test_a_parachute_that_is_named_is_the_only_one():
+    bench = of_two().hear(CHUTE, status())
+    bench.link.deploy(1, False, bench.now, "1/161")
+    bench.collect().at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED)).at(10.0)
+    assert told_to(bench) == [CHUTE]
 
 
 def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
@@ -64,7 +107,7 @@ def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
     waits need not wait for them, and its own status ends it."""
     bench = Bench().hear(PILOT, copter()).hear(CHUTE, status())
     assert bench.link.has_parachute()
-    assert bench.link.chosen_parachute() is None, "its link is its heartbeats"
+    assert bench.link.chosen_parachute(bench.now) is None, "its link is its heartbeats"
     bench.call("deploy", 1, False)
     (order,) = bench.commands(RELEASE)
     assert (order.target_system, order.target_component) == CHUTE
@@ -148,11 +191,11 @@ def test_other_vehicles_and_ground_stations_do_not_confuse_it():
     bench = Bench(parachute_system_id=1, autopilot_system_id=1)
     bench.hear((2, 161), heartbeat(), status(deployed=1)).hear((2, 1), copter(armed=True))
     bench.hear(GROUND, GCS).hear((1, 154), heartbeat(d.MAV_TYPE_GIMBAL)).hear((0, 1), copter())
-    assert bench.link.chosen_parachute() is None
+    assert bench.link.chosen_parachute(bench.now) is None
     assert bench.link.vehicle_state(bench.now).armed is Armed.UNKNOWN
     bench.hear(CHUTE, heartbeat(), status()).hear(PILOT, copter())
     bench.hear((2, 161), heartbeat(), status(deployed=1)).hear((2, 1), copter(armed=True))
-    assert bench.link.chosen_parachute().device == "1/161"
+    assert bench.link.chosen_parachute(bench.now).device == "1/161"
     assert bench.last_status().state is ParachuteState.READY
     assert bench.link.vehicle_state(bench.now).source == "1/1"
     assert bench.link.vehicle_state(bench.now).armed is Armed.DISARMED
@@ -328,7 +371,7 @@ def test_signed_end_to_end():
     first = chute.encode(heartbeat(), START)
     bench.link.receive(liar.encode(heartbeat(), START), START)
     bench.link.receive(FrameEncoder(*CHUTE).encode(heartbeat(), START), START)
-    assert bench.link.chosen_parachute() is None
+    assert bench.link.chosen_parachute(bench.now) is None
     bench.link.receive(first, START)
     bench.link.receive(first, START)
     bench.link.receive(chute.encode(status(), START + 0.1), START + 0.1)

@@ -18,7 +18,7 @@ def test_connection_identified_by_type_MAV_TYPE_PARACHUTE():  # noqa: N802
     """Any ID may be used; the public emulator uses 0."""
     for component in (d.MAV_COMP_ID_PARACHUTE, 1, 191, 0, 255):
         bench = ready((2, component))
-        assert bench.link.chosen_parachute().device == f"2/{component}"
+        assert bench.link.chosen_parachute(bench.now).device == f"2/{component}"
         assert bench.last_status().state is ParachuteState.READY
 
 
@@ -26,13 +26,13 @@ def test_connection_counts_by_the_type_alone():
     # Connection MAV COMP ID PARACHUTE without the type is no parachute.
     # Connection type counts whatever the field autopilot says.
     bench = Bench().hear(PARACHUTE, heartbeat(autopilot=d.MAV_AUTOPILOT_GENERIC), status())
-    assert bench.link.chosen_parachute().device == "1/161"
+    assert bench.link.chosen_parachute(bench.now).device == "1/161"
     assert bench.link.autopilots.all() == []
 
 
 def test_connection_heartbeats_at_1_Hz_keep_it_and_their_end_loses_it():  # noqa: N802
     bench = ready().stream(5.0, 1.0, PARACHUTE, heartbeat)
-    assert bench.link.chosen_parachute().liveness.state is LinkState.OK
+    assert bench.link.chosen_parachute(bench.now).liveness.state is LinkState.OK
     bench.at(7.6)
     assert bench.last_status().link_state is LinkState.STALE
     bench.at(10.1)
@@ -48,7 +48,7 @@ def test_connection_distinguished_by_component_id():
 
 def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     bench = Bench().hear(PARACHUTE, status())
-    assert bench.link.chosen_parachute() is None
+    assert bench.link.chosen_parachute(bench.now) is None
     assert bench.events == []
     bench.call("arm", 1, True, 0)
     assert "no parachute was received on this link" in bench.end(1).finished.message
@@ -74,7 +74,7 @@ def test_connection_MAV_CMD_REQUEST_MESSAGE_512():  # noqa: N802
 
 def test_connection_COMPONENT_INFORMATION_BASIC_field_by_field():  # noqa: N802
     def told(message):
-        return ready().hear(PARACHUTE, message).link.chosen_parachute().information
+        return ready().hear(PARACHUTE, message).link.chosen_parachute(0.0).information
 
     assert vars(told(information_basic())) == {
         "vendor_name": "Maker",
@@ -136,7 +136,7 @@ def test_SET_PARACHUTE_ARM_mask_that_no_status_can_show_is_not_sent():  # noqa: 
 
 def test_STATUS_stream_nominally_1_Hz_is_watched():  # noqa: N802
     bench = ready().at(1.0).hear(PARACHUTE, heartbeat(), status(boot_ms=6000))
-    assert bench.link.chosen_parachute().status_interval == pytest.approx(1.0)
+    assert bench.link.chosen_parachute(bench.now).status_interval == pytest.approx(1.0)
     bench.stream(4.0, 1.0, PARACHUTE, heartbeat).at(4.5)
     assert bench.last_status().faults == ("PARACHUTE_STATUS 3.5 s old",)
 
