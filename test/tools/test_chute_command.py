@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import signal
@@ -89,6 +90,20 @@ def test_a_blocked_vehicle_tells_why(ready):
     assert out.startswith("BLOCKED\n")
     assert "  flight             BLOCKED\n" in out
     assert "mavlink_parachute  OK, device NOT healthy" in out
+
+
+def test_each_parachute_of_a_link_is_shown_though_each_tells_of_itself_once_a_second(ready):
+    publisher = ready.link.create_publisher(ParachuteStatus, "parachute/status", qos.STATUS)
+    devices = itertools.cycle(["1/161", "1/162", "1/163"])
+
+    def tell():
+        status = ParachuteStatus(link="mavlink_parachute", device=next(devices), link_state=1)
+        publisher.publish(stamped(ready.link, status))
+
+    ready.link.create_timer(1.0 / 3.0, tell)
+    _, out, _ = run(ready.bench, "status", "--json")
+    told = [one["device"] for one in json.loads(out)["parachutes"]]
+    assert told == ["1/161", "1/162", "1/163"]
 
 
 def test_its_json_is_one_object(ready):

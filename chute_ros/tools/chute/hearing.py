@@ -31,13 +31,14 @@ def stamp_seconds(message: Any) -> float:
 
 @dataclass(frozen=True)
 class Heard:
-    """A message; when it was received, monotonic s and Unix s; and the how-manieth it is of its
-    kind and sender, from 1 on."""
+    """A message; when it was received, monotonic s and Unix s; the how-manieth it is of its kind
+    and sender, from 1 on; and when the first of those was received, monotonic s, NaN: not kept."""
 
     message: Any
     received: float
     wall: float
     number: int = 1
+    first: float = math.nan
 
 
 @dataclass
@@ -147,6 +148,7 @@ class Picture:
 
 def _remember(into: dict[Any, Heard], key: Any, message: Any, now: float, wall: float) -> None:
     before = into.pop(key, None)
-    into[key] = Heard(message, now, wall, before.number + 1 if before else 1)
+    number, first = (before.number + 1, before.first) if before else (1, now)
+    into[key] = Heard(message, now, wall, number, first)
     while len(into) > MOST_NAMES:
         del into[min(into, key=lambda one: into[one].received)]

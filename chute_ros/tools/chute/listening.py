@@ -26,6 +26,8 @@ from chute_ros.tools.chute.words import is_old
 #: A supervisor publishes its state at least each second, a parachute its status about as often:
 #: so long after the first word everything that lives was received once, s.
 SETTLE = 1.5
+#: After the first heartbeat of a node each parachute of it that lives was received within this, s.
+ROUND = 1.1
 
 
 def subscribe(
@@ -67,6 +69,17 @@ class Listening:
         self._session.until(self._found, seconds)
         self._session.until(self._complete, SETTLE)
         return self.view()
+
+    def whole(self, seconds: float) -> VehiclePicture | None:
+        """As settle, and each parachute: a link may have several, and nothing but the status of
+        each tells that it is there."""
+        self.settle(seconds)
+        self._session.until(self._each_told, ROUND)
+        return self.view()
+
+    def _each_told(self) -> bool:
+        now = time.monotonic()
+        return all(now - one.first >= ROUND for one in self.picture.heartbeats.values())
 
     def _found(self) -> bool:
         """Each link that the supervisor receives is received here as well."""

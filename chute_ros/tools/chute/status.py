@@ -16,7 +16,7 @@ def main(chosen: Chosen) -> int:
         listening = Listening(session)
         if not session.until(listening.view, within):
             raise session.not_heard("no supervisor is received", within)
-        picture = listening.settle(within)
+        picture = listening.whole(within)
     assert picture is not None
     if chosen.json:
         print(json_text(picture))
