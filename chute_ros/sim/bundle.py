@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from chute_ros.transport.wire import Wire
+from chute_ros.transport.wire import ServingWire, Wire
 
 
 class WireBundle:
@@ -12,6 +12,7 @@ class WireBundle:
 
     def __init__(self, wires: list[Wire]) -> None:
         self._wires = wires
+        self._read_last: object = None
 
     @property
     def is_open(self) -> bool:
@@ -32,8 +33,13 @@ class WireBundle:
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
         for wire in self._wires:
             if file in wire.files():
+                self._read_last = wire
                 return wire.read(file)
         return []
+
+    def data_heard(self, stream: Hashable, framed: bool, now: float) -> None:
+        if isinstance(self._read_last, ServingWire):
+            self._read_last.data_heard(stream, framed, now)
 
     def write(self, data: bytes) -> None:
         failure: OSError | None = None

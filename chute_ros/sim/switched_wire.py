@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from chute_ros.sim.acting import NotNowError
-from chute_ros.transport.wire import Wire
+from chute_ros.transport.wire import ServingWire, Wire
 
 
 class SwitchedWire:
@@ -34,6 +34,10 @@ class SwitchedWire:
         chunks = self._wire.read(file)
         # The end of a stream is no data: the link must know of it all the same.
         return [(data, stream) for data, stream in chunks if not (self.is_cut and data)]
+
+    def data_heard(self, stream: Hashable, framed: bool, now: float) -> None:
+        if isinstance(self._wire, ServingWire):
+            self._wire.data_heard(stream, framed, now)
 
     def write(self, data: bytes) -> None:
         if not self.is_cut:

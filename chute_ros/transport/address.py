@@ -1,6 +1,6 @@
 """Address of a byte wire, in one string.
 
-udpin:HOST:PORT                        listen; answer everyone who was heard there
+udpin:HOST:PORT                        listen; answer everyone whose frames were heard there
 udpout:HOST:PORT                       send there; listen to what comes back
 udppair:HOST:PORT:HOST:PORT            two one-way sockets: listen on the first, send to the second
 tcp:HOST:PORT    tcpin:HOST:PORT       connect; accept connections

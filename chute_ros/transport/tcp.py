@@ -122,9 +122,9 @@ class TcpServerWire:
             except OSError:
                 _end(client)
 
-    def frame_heard(self, stream: Hashable, now: float) -> None:
-        """What this stream sent held a frame."""
-        if stream in self._frame_at:
+    def data_heard(self, stream: Hashable, framed: bool, now: float) -> None:
+        """The protocol has taken what this stream sent. framed: it held a frame."""
+        if framed and stream in self._frame_at:
             self._frame_at[stream] = now
 
     def look(self, now: float) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import socket
+from collections import deque
 from collections.abc import Hashable, Iterator
 from typing import Any
 
 from chute_ros.transport.address import Address
+from chute_ros.transport.tcp import GIVE_BACK_AFTER
 
-#: Most senders that are answered; the one that was silent longest gives way.
+#: Most senders that are answered.
 MOST_PEERS = 8
 #: Datagrams taken at once, so that a flood cannot keep the loop from its deadlines.
 _BURST = 64
@@ -16,14 +18,21 @@ _LARGEST = 2048
 
 
 class UdpWire:
-    """udpin, udpout or udppair, by the kind of the address."""
+    """udpin, udpout or udppair, by the kind of the address.
+
+    udpin answers the senders of frames. One that sends frames keeps its place, whoever else comes;
+    if all places are taken, the one that was silent longest gives way once it is as silent as a
+    client of tcpin may be."""
 
     def __init__(self, address: Address) -> None:
         self._address = address
         self._receiver: socket.socket | None = None
         self._sender: socket.socket | None = None
         self._fixed: tuple[str, int] | None = None
-        self._peers: dict[tuple[str, int], None] = {}
+        #: Of what was read last and the protocol has not taken yet, oldest first.
+        self._senders: deque[tuple[str, int]] = deque()
+        #: When each sent its newest frame, monotonic s; who was silent longest is the first.
+        self._peers: dict[tuple[str, int], float] = {}
 
     @property
     def is_open(self) -> bool:
@@ -56,20 +65,31 @@ class UdpWire:
             end.close()
         self._receiver = self._sender = None
         self._peers.clear()
+        self._senders.clear()
 
     def files(self) -> list[int]:
         return [] if self._receiver is None else [self._receiver.fileno()]
 
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
         assert self._receiver is not None
-        datagrams: list[tuple[bytes, Hashable]] = []
-        for data, peer in received(self._receiver, _LARGEST):
-            datagrams.append((data, None))
-            self._peers.pop(peer, None)
-            self._peers[peer] = None
-        while len(self._peers) > MOST_PEERS:
-            del self._peers[next(iter(self._peers))]
-        return datagrams
+        datagrams = list(received(self._receiver, _LARGEST))
+        self._senders = deque(sender for _, sender in datagrams)
+        return [(data, None) for data, _ in datagrams]
+
+    def data_heard(self, stream: Hashable, framed: bool, now: float) -> None:
+        """The protocol has taken the next datagram. framed: it held a frame."""
+        if not self._senders:
+            return
+        sender = self._senders.popleft()
+        if not framed or self._fixed is not None:
+            return
+        known = self._peers.pop(sender, None) is not None
+        if not known and len(self._peers) >= MOST_PEERS:
+            silent = next(iter(self._peers))
+            if now - self._peers[silent] < GIVE_BACK_AFTER:
+                return
+            del self._peers[silent]
+        self._peers[sender] = now
 
     def write(self, data: bytes) -> None:
         assert self._sender is not None

@@ -55,8 +55,9 @@ class WatchfulWire(Protocol):
 class ServingWire(Protocol):
     """A wire that keeps places for clients."""
 
-    def frame_heard(self, stream: Hashable, now: float) -> None:
-        """What this stream sent held a frame."""
+    def data_heard(self, stream: Hashable, framed: bool, now: float) -> None:
+        """The protocol has taken the next of the data that were read last. framed: it held a
+        frame."""
 
 
 class WireWatch:
@@ -83,8 +84,8 @@ class WireWatch:
     def data_heard(self, stream: Hashable, now: float) -> None:
         """The protocol has data of this stream."""
         framed = self._frames is None or self._frames() > self._before
-        if self._serving is not None and framed:
-            self._serving.frame_heard(stream, now)
+        if self._serving is not None:
+            self._serving.data_heard(stream, framed, now)
 
     def look(self, now: float) -> None:
         """Look at the clock."""

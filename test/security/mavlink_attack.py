@@ -42,7 +42,7 @@ def signing(device: Any) -> Any:
 
 
 class Attacker:
-    """Reads all that reaches its end of the wire, and sends whatever bytes it likes."""
+    """Reads all that reaches the module, and sends whatever bytes it likes."""
 
     def __init__(self) -> None:
         self.heard: list[bytes] = []
@@ -54,7 +54,7 @@ class Attacker:
     # -- as the loop wants it -------------------------------------------------------------------
 
     def receive(self, data: bytes, now: float, stream: Any = None) -> None:
-        self.heard.append(data)
+        """The node answers nobody who sends no valid frame."""
 
     def stream_ended(self, stream: Any) -> None: ...
 
@@ -69,6 +69,18 @@ class Attacker:
 
     def take_events(self) -> list[Any]:
         return []
+
+
+class Overheard(Module):
+    """A module on whose wire somebody listens."""
+
+    def __init__(self, attacker: Attacker) -> None:
+        super().__init__()
+        self._attacker = attacker
+
+    def receive(self, data: bytes, now: float, stream: Any = None) -> None:
+        self._attacker.heard.append(data)
+        super().receive(data, now, stream)
 
 
 def deployed(ids: tuple[int, int], signer: Signer | None = None) -> list[bytes]:
@@ -112,11 +124,11 @@ class Attacked:
         self.network = Network(bench, **self.parameters)
         self.attacker = Attacker()
         self.plug_attacker()
-        self.module = signing(Module())
+        self.module = signing(Overheard(self.attacker))
         self.autopilot = signing(Autopilot())
 
     def plug_attacker(self) -> None:
-        """The node has heard of it, and sends to it as to the others."""
+        """The node has heard of it."""
         self.attackers_loop = self.network.plug(self.attacker)
         self.attackers_loop.call(lambda link, now: link.say(b"who is there?"))
         self.bench.until(lambda: self.link.counts, "the node has heard of it")

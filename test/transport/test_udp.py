@@ -1,11 +1,14 @@
 """UDP as a wire, over real sockets on loopback."""
 
+import contextlib
 import socket
 
 import pytest
-from loop_bench import LOCAL, descriptors, free_port, running, udp
+from loop_bench import LOCAL, Running, descriptors, free_port, running, udp
 
 from chute_ros.transport.address import Address
+from chute_ros.transport.loop import WireLoop
+from chute_ros.transport.tcp import GIVE_BACK_AFTER
 from chute_ros.transport.udp import MOST_PEERS, UdpWire
 
 
@@ -50,30 +53,90 @@ def test_everyone_who_was_heard_is_answered():
         assert [device.recv(100) for device in (first, second)] == [b"to all", b"to all"]
 
 
-def test_of_too_many_peers_the_one_that_was_silent_longest_is_forgotten():
+FRAME, NOISE = b"frame", b"noise"
+
+
+@pytest.fixture
+def server():
+    """A listening wire, and more devices than are answered."""
     wire = UdpWire(Address("udpin", LOCAL, 0))
     wire.open()
-    peers = [udp() for _ in range(MOST_PEERS + 1)]
+    peers = [udp() for _ in range(MOST_PEERS + 4)]
+    yield wire, peers
+    wire.close()
+    for peer in peers:
+        peer.close()
+
+
+def says(wire, data, now, *peers):
+    """These send data, and the protocol takes it: one after the other."""
+    here = (LOCAL, int(wire.describe().split(":")[2]))
+    for peer in peers:
+        peer.sendto(data, here)
+    taken = 0
+    while taken < len(peers):  # loopback delivers at once, or almost
+        for chunk, stream in wire.read(wire.files()[0]):
+            taken += 1
+            wire.data_heard(stream, chunk == FRAME, now)
+
+
+def answered(wire, peers):
+    """Which of them hear what is written."""
+    wire.write(b"to all")
+    heard = []
+    for number, peer in enumerate(peers):
+        peer.settimeout(0.05)
+        with contextlib.suppress(TimeoutError):
+            assert peer.recv(100) == b"to all"
+            heard.append(number)
+    return heard
+
+
+def test_garbage_from_many_ports_takes_no_place_and_is_not_answered(server):
+    wire, peers = server
+    says(wire, FRAME, 0.0, peers[0])
+    # In one read as well.
+    says(wire, NOISE, 60.0, *peers[2:])
+    assert answered(wire, peers) == [0]
+    says(wire, FRAME, 60.0, peers[1])
+    # One damaged datagram of a known device takes its place from nobody.
+    says(wire, NOISE, 60.1, peers[1])
+    assert answered(wire, peers) == [0, 1]
+
+
+def test_who_sends_frames_keeps_its_place_and_who_was_silent_longest_gives_way(server):
+    wire, peers = server
+    says(wire, FRAME, 0.0, *peers[:MOST_PEERS])
+    # Others come with frames as well, and more often.
+    for second in range(1, 10):
+        says(wire, FRAME, float(second), peers[0], *peers[MOST_PEERS:])
+    assert answered(wire, peers) == list(range(MOST_PEERS))
+    # All but the first have been silent for long.
+    says(wire, FRAME, 0.0 + GIVE_BACK_AFTER, peers[MOST_PEERS], peers[0])
+    assert answered(wire, peers) == [0, *range(2, MOST_PEERS + 1)]
+
+
+def test_only_those_are_answered_whose_frames_the_protocol_takes(await_until):
+    one = Running(f"udpin:{LOCAL}:0")
+    one.loop.stop()
+
+    def frames():
+        return sum(data == FRAME for data, _ in one.link.received)
+
+    one.loop = WireLoop(one.link, one.wire, one.delivered.extend, frames=frames)
+    one.loop.start()
     try:
-        here = (LOCAL, int(wire.describe().split(":")[2]))
-        # The very first one speaks again before the last one comes: it is not the most silent.
-        for peer in [*peers[:-1], peers[0], peers[-1]]:
-            peer.sendto(b"here", here)
-            while not wire.read(wire.files()[0]):
-                pass  # loopback delivers at once, or almost
-        wire.write(b"to all")
-        heard = []
-        for peer in peers:
-            peer.settimeout(20.0 if peer is not peers[1] else 0.05)
-            try:
-                heard.append(peer.recv(100) == b"to all")
-            except TimeoutError:
-                heard.append(False)
-        assert heard == [True, False, *[True] * (MOST_PEERS - 1)]
+        with udp() as device, udp() as stranger:
+            device.sendto(FRAME, (LOCAL, one.port))
+            stranger.sendto(NOISE, (LOCAL, one.port))
+            await_until(lambda: len(one.link.received) == 2, "both are heard")
+            one.send(b"to you")
+            assert device.recv(100) == b"to you"
+            stranger.settimeout(0.05)
+            with pytest.raises(TimeoutError):
+                stranger.recv(100)
     finally:
-        wire.close()
-        for peer in peers:
-            peer.close()
+        one.loop.stop()
 
 
 def test_nobody_is_there_to_hear_and_later_somebody_is(await_until):
@@ -96,7 +159,7 @@ def test_an_unreachable_peer_costs_its_own_frame_only(await_until):
             device.sendto(b"x", (LOCAL, node.port))
         await_until(lambda: len(node.link.received) == 2, "both are heard")
         # An address to which this host has no right to send fails in sendto itself.
-        node.wire._peers = {("255.255.255.255", 9): None, **node.wire._peers}
+        node.wire._peers = {("255.255.255.255", 9): 0.0, **node.wire._peers}
         gone.close()
         node.send(b"first")
         node.send(b"second")
