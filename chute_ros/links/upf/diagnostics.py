@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.devices import Controller, Device
+from chute_ros.links.upf.protocol.devices import Controller, Device, Trigger
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.ros import diagnostics
 
@@ -100,6 +100,9 @@ def _devices(link: UpfLink, now: float) -> Iterator[Task]:
         yield "parachute", diagnostics.STALE, "never received", {}, ""
     elif not controllers and not link.config.without_controller:
         yield Controller.kind, diagnostics.ERROR, _NO_CONTROLLER, {}, ""
+    if missing := link.devices.missing_trigger():
+        text = f"never received: need its TriggerStatus (trigger_node_id {missing})"
+        yield f"{Trigger.kind} {missing}", diagnostics.ERROR, text, {}, ""
     for controller in controllers.values():
         values = _of_controller(controller, now)
         yield _device(controller, controller.state.name, controller.faults(now), values, now)

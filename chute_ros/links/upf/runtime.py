@@ -73,9 +73,11 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
             return Summary(LinkState.NEVER_SEEN, False, NAN, reasons)
         device = link.devices.controller() or link.devices.trigger()
         assert device is not None
-        # Doubt about who is on the bus, or a trigger that is in trouble, forbids take-off, but
-        # takes nothing back in flight.
-        sound = not troubles and all(one.sound for one in link.devices.triggers.values())
+        # Doubt about who is on the bus, or a trigger that is in trouble or was never received,
+        # forbids take-off, but takes nothing back in flight.
+        sound = not (troubles or link.devices.missing_trigger()) and all(
+            one.sound for one in link.devices.triggers.values()
+        )
         healthy = picture.healthy and (sound or link.in_air(now))
         liveness = device.liveness
         return Summary(liveness.state, healthy, liveness.age(now), () if healthy else reasons)
@@ -163,6 +165,8 @@ def reasons_of(
     """Why it is not healthy, in words: what is so, and what is needed; none if nothing is wrong.
     picture: of the parachute, None: there is none yet. troubles: of the bus."""
     found = [_never_heard(config)] if picture is None else _of_picture(picture, devices)
+    if missing := devices.missing_trigger():
+        found.append(_never_received("trigger", missing, "TriggerStatus"))
     for trigger in devices.triggers.values():
         if not trigger.sound:
             found += _of_trigger(trigger, now)
@@ -170,9 +174,12 @@ def reasons_of(
 
 
 def _never_heard(config: UpfConfig) -> str:
-    kind, wanted, status = "controller", config.controller_node_id, "ParachuteStatus"
     if config.without_controller:
-        kind, wanted, status = "trigger", config.trigger_node_id, "TriggerStatus"
+        return _never_received("trigger", config.trigger_node_id, "TriggerStatus")
+    return _never_received("controller", config.controller_node_id, "ParachuteStatus")
+
+
+def _never_received(kind: str, wanted: int, status: str) -> str:
     name = f"{kind} {wanted}" if wanted else f"a {kind}"
     where = "from this node id" if wanted else f"({kind}_node_id 0: of any node)"
     return f"{name} was never received: need its {status} {where}"

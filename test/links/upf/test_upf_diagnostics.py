@@ -7,8 +7,12 @@ from upf_bench import OTHER_LAYOUT, Devices, Network, tasks, values
 
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import NODE_ID
-from chute_ros.links.upf.protocol.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
-from chute_ros.model import LinkState
+from chute_ros.links.upf.protocol.definitions import (
+    PARACHUTE_STATUS,
+    TRIGGER_STATUS,
+    VEHICLE_SERVICE,
+)
+from chute_ros.model import LinkState, ParachuteState
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -107,6 +111,40 @@ def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):
             lambda absent=absent: any(f"have no {absent}" in one.msg for one in said),
             f"{absent} is named",
         )
+
+
+def test_a_named_trigger_that_is_missing_forbids_take_off(bench):
+    """Given a controller that is READY, as after a restart of the node alone."""
+    network = Network(bench, trigger_node_id=34)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    ready = network.definitions.state_number(ParachuteState.READY)
+    controller, trigger = network.party(33), network.party(34)
+
+    def beat_after(told):
+        beats.clear()
+
+        def seen():
+            told()
+            return len(beats) >= 3 and beats[-1].link_state == LinkState.OK
+
+        bench.until(seen, "it beats")
+        return beats[-1]
+
+    def controller_tells():
+        controller.say(PARACHUTE_STATUS, state=ready)
+
+    def both_tell():
+        controller_tells()
+        state = network.definitions.constant(TRIGGER_STATUS, "STATE_READY")
+        trigger.say(TRIGGER_STATUS, state=state)
+
+    beat = beat_after(controller_tells)
+    assert not beat.device_healthy
+    assert any(one.startswith("trigger 34 was never received") for one in beat.reasons)
+    bench.until(lambda: "trigger 34" in tasks(diagnostics), "it is told")
+    assert tasks(diagnostics)["trigger 34"].level == ERROR
+    assert beat_after(both_tell).device_healthy
 
 
 @pytest.mark.parametrize("without_controller", [False, True])

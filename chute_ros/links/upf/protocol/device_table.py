@@ -72,6 +72,11 @@ class DeviceTable(EventLog):
         """The first that is not lost, or the first."""
         return first_alive(self.triggers.values())
 
+    def missing_trigger(self) -> int:
+        """The node id of the trigger that is named and was never received; 0: none is missing."""
+        wanted = self._config.trigger_node_id
+        return 0 if wanted in self.triggers else wanted
+
     def alive_triggers(self) -> list[Trigger]:
         """Those that are heard."""
         return [trigger for trigger in self.triggers.values() if trigger.alive]

@@ -32,6 +32,18 @@ def test_each_reason_is_told_with_its_value(bench):
     assert reasons(story, "two nodes use node id 40") == ("two nodes use node id 40",)
 
 
+def test_a_named_trigger_that_was_never_received_is_a_reason(bench):
+    story = bench("", trigger_node_id=34).status("READY")
+    missing = "trigger 34 was never received: need its TriggerStatus from this node id"
+    assert reasons(story) == (missing,)
+    # Another trigger is not the one that is named.
+    assert reasons(story.trigger_status(node_id=35)) == (missing,)
+    assert reasons(story.trigger_status()) == ()
+    # Without a controller it is told once, and with a controller that is missing as well.
+    assert reasons(bench("", trigger_node_id=34, without_controller=True)) == (missing,)
+    assert len(reasons(bench("", trigger_node_id=34))) == 2
+
+
 @pytest.mark.parametrize(
     ("config", "text"),
     [
