@@ -105,7 +105,11 @@ def _devices(link: UpfLink, now: float) -> Iterator[Task]:
         yield f"{Trigger.kind} {missing}", diagnostics.ERROR, text, {}, ""
     for controller in controllers.values():
         values = _of_controller(controller, now)
-        yield _device(controller, controller.state.name, controller.faults(now), values, now)
+        task = _device(controller, controller.state.name, controller.faults(now), values, now)
+        if node_id := link.devices.came_back_as(controller):
+            name, _, _, told, device = task
+            task = name, diagnostics.WARN, f"came back as {node_id}", told, device
+        yield task
     for trigger in triggers.values():
         values = {"has fired": trigger.launched}
         yield _device(trigger, trigger.state, trigger.faults(now), values, now)

@@ -113,6 +113,22 @@ def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):
         )
 
 
+def test_a_controller_that_came_back_under_another_node_id_is_told_so(bench):
+    network = Network(bench)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    ready = network.definitions.state_number(ParachuteState.READY)
+    network.party(120).say(PARACHUTE_STATUS, state=ready)
+    bench.until(lambda: "controller 120" in tasks(diagnostics), "it is received")
+    now = network.party(121)
+
+    def told():
+        now.say(PARACHUTE_STATUS, state=ready, is_vehicle_connected=True)
+        return tasks(diagnostics)["controller 120"].message == "came back as 121"
+
+    bench.until(told, "its former node id names the new one")
+    assert tasks(diagnostics)["controller 120"].level == WARN
+
+
 def test_a_named_trigger_that_is_missing_forbids_take_off(bench):
     """Given a controller that is READY, as after a restart of the node alone."""
     network = Network(bench, trigger_node_id=34)

@@ -49,24 +49,31 @@ class DeviceTable(EventLog):
     # -- who -------------------------------------------------------------------------------------
 
     def controller(self, node_id: int = 0) -> Controller | None:
-        """The one with this node id; 0: the first that is not lost, or the first."""
+        """The one with this node id; 0: the first that is not lost, or the first, of those that
+        have not come back under another node id."""
         if node_id:
             return self.controllers.get(node_id)
-        return first_alive(self.controllers.values())
+        return first_alive(self._there()) or first_alive(self.controllers.values())
 
     def only_controller(self) -> Controller | None:
-        """With several, nobody says which trigger is whose. One that was lost before another was
-        heard first may be the same: it need not keep its node id."""
-        there = [one for one in self.controllers.values() if not self._came_back(one)]
+        """With several, nobody says which trigger is whose."""
+        there = self._there()
         return there[0] if len(there) == 1 else None
 
-    def _came_back(self, gone: Controller) -> bool:
-        """Under another node id, as far as can be told."""
-        lost = gone.liveness.state is LinkState.LOST
-        return lost and any(
-            other.alive and other.liveness.first_heard > gone.liveness.last_heard
+    def _there(self) -> list[Controller]:
+        return [one for one in self.controllers.values() if not self.came_back_as(one)]
+
+    def came_back_as(self, gone: Controller) -> int:
+        """The node id that this controller has now, as far as can be told: one that fell silent
+        before another was first heard may be the same. 0: it has come back under none."""
+        if gone.liveness.state is LinkState.OK:
+            return 0
+        after = (
+            other.node_id
             for other in self.controllers.values()
+            if other.alive and other.liveness.first_heard > gone.liveness.last_heard
         )
+        return next(after, 0)
 
     def trigger(self) -> Trigger | None:
         """The first that is not lost, or the first."""

@@ -288,6 +288,35 @@ def test_trigger_that_falls_silent_is_told_with_the_picture_of_its_controller(be
     assert any("trigger 34 LOST" in fault for fault in story.pictures()[-1].faults)
 
 
+def test_controller_under_a_new_node_id_takes_the_place_of_the_one_that_fell_silent(bench):
+    """Given one that restarts and is given another node id (DNA)."""
+    story = bench("").status("READY", 120)
+    devices = story.link.devices
+    for tenth in range(1, 40):
+        story.at(tenth / 10)
+        if story.t >= 1.0:
+            story.status("READY", 121)
+        silent = devices.controllers[120].liveness.state is not LinkState.OK
+        assert devices.controller().node_id == (121 if silent else 120), story.t
+        assert devices.came_back_as(devices.controllers[120]) == (121 if silent else 0)
+    assert story.picture().device == "121"
+    assert devices.only_controller().node_id == 121
+    # Nothing came back: the first is meant still.
+    assert story.after(9.0).link.devices.controller().node_id == 120
+    # Both speak: they are two.
+    story.status("READY", 120).status("READY", 121)
+    assert devices.controller().node_id == 120
+    assert devices.only_controller() is None
+
+
+def test_controller_that_spoke_before_another_fell_silent_is_another(bench):
+    story = bench("").status("READY", 120).status("READY", 121)
+    for tenth in range(1, 25):
+        story.at(tenth / 10).status("READY", 121)
+    assert story.link.devices.controller().node_id == 120, "STALE, and not known to be gone"
+    assert story.link.devices.only_controller() is None
+
+
 def test_trigger_is_the_parachute_where_the_parameter_says_that_there_is_no_controller(bench):
     story = bench("").trigger_status()
     assert (story.picture(), story.pictures()) == (None, [])
