@@ -321,6 +321,16 @@ def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(
     assert {kill.rule for kill in story.decisions(K)} <= {"tipped over at take-off"}
 
 
+@pytest.mark.parametrize(("force", "fired"), [(21.6, []), (9.8, ["KILL"])])
+def test_a_level_pass_at_the_height_of_the_take_off_has_not_tipped_over(
+    force: float, fired: list[str]
+) -> None:
+    """At 63 degrees of bank, as no target tells: PX4 in acro, or a source besides the autopilot."""
+    story = Story(shipped("multirotor")).ready().fly(1.0, height=30.0).fly(9.0, height=2.0)
+    story.fly(12.0, height=2.0, tilt=63.0, acceleration=force)
+    assert story.fired() == fired
+
+
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
 def test_an_attitude_sensor_that_sends_noise_ends_no_flight(name: str) -> None:
     noise = Random(1)
