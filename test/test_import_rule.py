@@ -1,5 +1,6 @@
 """The rule that the pure packages stay pure holds, and it bites."""
 
+import ast
 import shutil
 import subprocess
 from pathlib import Path
@@ -73,3 +74,45 @@ def test_io_behind_a_shared_module_is_found_too(copy):
     result = lint(copy)
     assert result.returncode == 1
     assert "chute_ros.errors -> subprocess" in result.stdout
+
+
+#: Files of the repository and of the system, which no person names.
+OWN = {
+    "tools/parameter_docs.py", "tools/pages.py", "tools/machine.py", "tools/explore_steps.py",
+    "tools/simulation.py", "tools/processes.py", "tools/streams.py", "tools/chute/doctor_ports.py",
+    "tools/panel/server.py",
+}  # fmt: skip
+
+
+def bare_reads(text):
+    """The lines that open or read a file themselves: of a FIFO they would wait for ever."""
+    found = []
+    for call in (one for one in ast.walk(ast.parse(text)) if isinstance(one, ast.Call)):
+        words = [one.value for one in call.args if isinstance(one, ast.Constant)]
+        words += [one.value.value for one in call.keywords if isinstance(one.value, ast.Constant)]
+        name = call.func.attr if isinstance(call.func, ast.Attribute) else ""
+        of_path = name == "open" and not ast.unparse(call.func).endswith(("os.open", "wire.open"))
+        is_open = of_path or (isinstance(call.func, ast.Name) and call.func.id == "open")
+        if name in ("read_text", "read_bytes") or (is_open and not {"wb", "ab", "w"} & {*words}):
+            found.append(call.lineno)
+    return found
+
+
+def test_what_a_person_names_is_read_by_regular_file_alone():
+    """transport/regular_file.py refuses a FIFO, a device and a folder in words."""
+    package = ROOT / "chute_ros"
+    files = {
+        str(path.relative_to(package)): path
+        for folder in ("tools", "campaign")
+        for path in (package / folder).rglob("*.py")
+    }
+    assert files.keys() >= OWN
+    found = {name: bare_reads(path.read_text()) for name, path in files.items()}
+    assert {name: lines for name, lines in found.items() if lines and name not in OWN} == {}
+
+
+@pytest.mark.parametrize(
+    "line", ["path.read_text()", "path.read_bytes()", "path.open('rb')", "open(path)"]
+)
+def test_and_finds_one_that_reads_by_itself(line):
+    assert bare_reads(f"text = {line}") == [1]

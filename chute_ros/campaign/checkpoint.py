@@ -15,6 +15,7 @@ from chute_ros.campaign.campaign import Line, Tally
 from chute_ros.campaign.judge import Count
 from chute_ros.errors import RecordError
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.transport.regular_file import open_regular
 from chute_ros.transport.shared_folder import shared_folder
 
 #: Rises when what is written means something else.
@@ -51,7 +52,8 @@ def _sum(files: Iterable[Path]) -> str:
     total = hashlib.sha256()
     for file in sorted(files, key=lambda one: (one.name, str(one))):
         if file.is_file():
-            total.update(hashlib.sha256(file.read_bytes()).digest())
+            with open_regular(file) as opened:
+                total.update(hashlib.sha256(opened.read()).digest())
     return total.hexdigest()
 
 

@@ -12,6 +12,7 @@ from chute_ros.links.registered import vehicles
 from chute_ros.sim.tape import Tape
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
+from chute_ros.transport.regular_file import read_regular_text
 
 
 class Shipped:
@@ -29,7 +30,7 @@ class Shipped:
         if key not in self._configs:
             told = vehicles()[vehicle].supervised
             file = self.profile_file(profile)
-            text = file.read_text(encoding="utf-8")
+            text = read_regular_text(file)
             plain = SupervisorConfig(
                 required_links=told("required_links"),
                 kill_links=told("kill_links"),

@@ -11,6 +11,7 @@ import yaml
 
 from chute_ros.errors import ParameterError
 from chute_ros.plain_yaml import Misread, load_marked
+from chute_ros.transport.regular_file import read_regular_text
 
 #: Names of nodes and parts of them in one file, at most.
 _MOST_NAMES = 1000
@@ -101,7 +102,7 @@ def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iter
 
 def _read(path: Path) -> Any:
     try:
-        return load_marked(path.read_text(encoding="utf-8"))
+        return load_marked(read_regular_text(path))
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:

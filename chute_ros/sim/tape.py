@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.errors import RecordError
+from chute_ros.transport.regular_file import open_regular
 
 MAGIC = b"chute tapes 1\n"
 #: Between two rows, s.
@@ -115,9 +116,10 @@ class Tape:
 def read_tapes(path: Path) -> list[Tape]:
     """All of a file. RecordError, with its name: it has none, or is damaged."""
     try:
-        data = path.read_bytes()
+        with open_regular(path) as file:
+            data = file.read()
     except OSError as error:
-        raise RecordError(f"{path}: {error.strerror}") from None
+        raise RecordError(f"{path}: {error.strerror or error}") from None
     if not data.startswith(MAGIC):
         raise RecordError(f"{path}: no file of tapes: it does not begin with {MAGIC!r}")
     tapes: list[Tape] = []

@@ -40,6 +40,7 @@ from chute_ros.tools.campaign_plan import plan
 from chute_ros.tools.campaign_vehicle import FLIGHTS, fly_described, refuse_unfit
 from chute_ros.tools.machine import machine
 from chute_ros.tools.page_file import MARKDOWN, SVG, require_output, write_page
+from chute_ros.transport.regular_file import open_regular, read_regular_text
 
 #: Where none are asked for.
 _FLIGHTS = 1000
@@ -280,7 +281,11 @@ class _Kept:
         """The flights of the last time; RecordError: they are not of this campaign."""
         if self._path is None or not self._path.exists():
             return campaign.Tally()
-        text = self._path.read_text(encoding="utf-8", errors="replace")
+        try:
+            with open_regular(self._path) as file:
+                text = file.read().decode("utf-8", errors="replace")
+        except OSError as error:
+            raise RecordError(f"{self._path}: {error.strerror or error}") from None
         tally = checkpoint.tally_of(text, self._seed, self._code, str(self._path))
         print(f"continuing after {tally.flights} flights of {self._path}", file=sys.stderr)
         return tally
@@ -392,7 +397,7 @@ def scenario(text: str) -> int | Scenario:
     if text.removeprefix("-").isdecimal():
         return int(text)
     try:
-        return scenario_of(Path(text).read_text(encoding="utf-8"), text)[0]
+        return scenario_of(read_regular_text(Path(text)), text)[0]
     except (OSError, UnicodeDecodeError) as error:
         raise argparse.ArgumentTypeError(f"{text}: need a seed, or a file: {error}") from None
     except RecordError as error:

@@ -19,6 +19,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from zstandard import ZstdDecompressor, ZstdError
 
 from chute_ros.errors import RecordError
+from chute_ros.transport.regular_file import open_regular
 
 #: Longest chunk, bytes: who writes MCAP ends one after four million at the latest.
 _LONGEST_CHUNK = 16 * 1024 * 1024
@@ -67,7 +68,7 @@ class McapEntries:
     def __iter__(self) -> Iterator[Entry]:
         """RecordError if there is no such file, or if it is no MCAP from its first byte on."""
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 yield from self._read(file)
         except OSError as error:
             raise RecordError(f"{self.path}: {error.strerror or error}") from None

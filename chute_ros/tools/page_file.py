@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from chute_ros.errors import ChuteError
+from chute_ros.transport.regular_file import open_regular
 
 #: So much of a file tells its kind, bytes.
 _HEAD = 500
@@ -69,7 +70,7 @@ def _existing(path: Path, kind: Kind, inputs: Iterable[Path]) -> os.stat_result 
         with contextlib.suppress(OSError):
             if os.path.samestat(about, one.stat()):
                 raise ChuteError(f"{path} is read here: nothing is written over it: name another")
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(_HEAD)
     if head and not kind.begins.match(head):
         raise ChuteError(f"{path} exists and is no {kind.name}: remove it, or name another")

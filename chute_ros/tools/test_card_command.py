@@ -17,6 +17,7 @@ from chute_ros.tools.recording import read
 from chute_ros.tools.recording_options import write_pages
 from chute_ros.tools.releases import releases
 from chute_ros.tools.test_card_page import DIAGNOSTICS, card
+from chute_ros.transport.regular_file import open_regular
 
 
 def main() -> None:
@@ -29,6 +30,11 @@ def test_card(files: list[Path]) -> str:
     kinds = {DECISION: SafetyDecision, PERSON: PersonRequest, DIAGNOSTICS: DiagnosticArray}
     recording = read(files, kinds)
     story = tell(recording)
-    hashes = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
+    hashes = [(path.name, _hash(path)) for path in files]
     end = recording.seconds(recording.turns[-1].wall)
     return card(recording, story, releases(story, end), hashes)
+
+
+def _hash(path: Path) -> str:
+    with open_regular(path) as file:
+        return hashlib.sha256(file.read()).hexdigest()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 #: No file that is read whole is longer, bytes.
 LONGEST = 16 * 2**20
@@ -25,25 +26,29 @@ class TooLongError(OSError):
     """It holds more than it may."""
 
 
+def open_regular(path: Path) -> BinaryIO:
+    """The file, open for reading, however long it is. OSError, as usual, and NotRegularError."""
+    # Before it is opened: that alone may do something to a device.
+    _check(os.stat(path))
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    try:
+        # What is opened may be another than what was looked at.
+        _check(os.fstat(number))
+        return os.fdopen(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
 def read_regular(path: Path, longest: int = LONGEST) -> tuple[os.stat_result, bytes]:
     """What the file is, and what is in it. OSError, as usual; NotRegularError and
     TooLongError (longest in bytes): a FIFO that nobody writes to would never answer, and a device
     such as /dev/zero never end."""
-    # Before it is opened: that alone may do something to a device.
-    _check(os.stat(path))
-    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
-    try:
-        about = os.fstat(file)
-        _check(about)
-        parts, size = [], 0
-        while part := os.read(file, longest + 1 - size):
-            parts.append(part)
-            size += len(part)
-            if size > longest:
-                raise TooLongError(f"it holds more than {longest} bytes")
-        return about, b"".join(parts)
-    finally:
-        os.close(file)
+    with open_regular(path) as file:
+        data = file.read(longest + 1)
+        if len(data) > longest:
+            raise TooLongError(f"it holds more than {longest} bytes")
+        return os.fstat(file.fileno()), data
 
 
 def read_regular_text(path: Path) -> str:

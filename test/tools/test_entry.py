@@ -28,6 +28,24 @@ sys.meta_path.insert(0, Slow())
 """
 
 
+#: A recording that is opened waits at the gate.
+GATED = """
+import os
+
+fdopen = os.fdopen
+
+
+def gated(number, *arguments, **named):
+    if os.readlink(f"/proc/self/fd/{number}").endswith("/recording.mcap"):
+        with open(os.environ["GATE"]) as gate:
+            gate.read()
+    return fdopen(number, *arguments, **named)
+
+
+os.fdopen = gated
+"""
+
+
 def start(tool, *arguments, **how):
     return subprocess.Popen(
         [sys.executable, "-m", f"chute_ros.tools.{tool}", *arguments],
@@ -57,16 +75,25 @@ def test_while_it_imports(tool, tmp_path):
 
 @pytest.fixture
 def recording(tmp_path):
-    """A recording that is never told to its end."""
+    """A recording that is read no further than the test lets it."""
     path = tmp_path / "recording.mcap"
-    os.mkfifo(path)
+    path.write_bytes(b"no MCAP")
+    os.mkfifo(tmp_path / "gate")
+    (tmp_path / "sitecustomize.py").write_text(GATED)
     return path
+
+
+def reading(tool, recording, **how):
+    path = os.pathsep.join([str(recording.parent), *filter(None, sys.path)])
+    gate = str(recording.with_name("gate"))
+    given = {**os.environ, "PYTHONPATH": path, "GATE": gate}
+    return start(tool, str(recording), env=given, **how)
 
 
 @pytest.mark.parametrize("tool", ["replay", "report", "to_rosbag2"])
 def test_while_it_reads(tool, recording):
-    started = start(tool, str(recording))
-    with recording.open("wb"):  # waits until it is opened there, too
+    started = reading(tool, recording)
+    with recording.with_name("gate").open("wb"):  # waits until it is opened there, too
         assert interrupted(started) == (130, f"{tool}: interrupted\n")
 
 
@@ -225,14 +252,13 @@ def test_an_error_of_another_cause_is_one():
 
 def test_one_that_is_to_ignore_it_goes_on(recording):
     """As a shell starts what is to run behind its back."""
-    started = start(
+    started = reading(
         "replay",
-        str(recording),
+        recording,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
     )
-    with recording.open("wb") as file:
+    with recording.with_name("gate").open("wb"):
         started.send_signal(signal.SIGINT)
-        file.write(b"no MCAP")
     _, err = started.communicate(timeout=60.0)
     assert (started.returncode, err) == (2, f"replay: {recording} is no MCAP file\n")
 
@@ -317,3 +343,30 @@ def test_no_tool_takes_it_for_a_result(tool):
     code, _, err = shell(["--help"], ">/dev/full", command)
     told = f"{tool}: standard output cannot be written: No space left on device\n"
     assert (code, err) == (74, told)
+
+
+# What is no file
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "report fifo",
+        "replay fifo",
+        "test_card fifo",
+        "to_rosbag2 fifo",
+        "judge_log fifo",
+        "campaign --replay fifo",
+        "campaign --flights 1 --resume fifo",
+        "campaign --tapes fifo",
+        "campaign --vehicle fifo",
+    ],
+)
+def test_a_fifo_in_place_of_a_file_is_not_waited_for(line, tmp_path):
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    tool, *arguments = (str(fifo) if one == "fifo" else one for one in line.split())
+    code, _, err = shell(arguments, "", (sys.executable, "-m", f"chute_ros.tools.{tool}"))
+    assert code == 2
+    assert "no regular file but a FIFO" in err
+    assert "Traceback" not in err

@@ -222,7 +222,7 @@ def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
 
 def test_a_fifo_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "flight.bin")
-    with pytest.raises(LogError, match="it is no file"):
+    with pytest.raises(LogError, match="no regular file but a FIFO"):
         formats.read(tmp_path / "flight.bin", {})
 
 
@@ -362,3 +362,13 @@ def test_no_page_goes_over_a_log_or_what_is_known_of_it(landed, tmp_path):
         assert ended.returncode == 2
         assert f"{arguments[1]} is read here: nothing is written over it" in ended.stderr
     assert (log.read_bytes(), known.read_bytes()) == before
+
+
+@pytest.mark.parametrize("option", ["--profile", "--known"])
+def test_a_fifo_in_place_of_an_option_is_not_waited_for(option, landed, tmp_path):
+    fifo = tmp_path / "fifo.yaml"
+    os.mkfifo(fifo)
+    log = FORMATS["flight.tlog"]([one for one in landed if one.at < 3.0], tmp_path / "well.tlog")
+    ended = run(log, "--page", tmp_path / "judged.html", option, fifo)
+    assert ended.returncode == 2
+    assert "no regular file but a FIFO" in ended.stderr

@@ -1,5 +1,6 @@
 """The same settings decide the same; others differ, and it is shown where."""
 
+import os
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -241,6 +242,12 @@ def test_what_cannot_be_read_or_written_is_told_without_a_traceback(
     nowhere = tmp_path / "none" / "p.svg"
     assert run(replay.main, monkeypatch, *flight.files(), "--picture", nowhere) == 2
     assert "No such file" in capsys.readouterr().err
+
+
+def test_a_fifo_in_place_of_the_settings_is_not_waited_for(flight, tmp_path, monkeypatch, capsys):
+    os.mkfifo(tmp_path / "fifo")
+    assert run(replay.main, monkeypatch, *flight.files(), "--config", tmp_path / "fifo") == 2
+    assert capsys.readouterr().err == f"replay: {tmp_path}/fifo: no regular file but a FIFO\n"
 
 
 def test_the_picture_goes_over_nothing_that_was_read(flight, other, monkeypatch, capsys):

@@ -21,6 +21,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "ArduPilot DataFlash"
 #: The first bytes of a binary log.
@@ -80,12 +81,13 @@ def read(path: Path) -> FlightLog:
 
 
 def _read(path: Path) -> FlightLog:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         binary = file.read(2) == MAGIC
     if binary:
         return _told(path, DFReader.DFReader_binary(str(path)), "")
     # Text logs until 3.1 have lines of the console before the first entry.
-    text = path.read_text(encoding="ascii", errors="replace")
+    with open_regular(path) as file:
+        text = file.read().decode("ascii", errors="replace")
     begin = max(0, text.find("FMT,"))
     if not begin:
         return _told(path, DFReader.DFReader_text(str(path)), "")

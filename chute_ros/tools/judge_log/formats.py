@@ -7,6 +7,7 @@ from pathlib import Path
 
 from chute_ros.tools.judge_log import bag, dataflash, table, telemetry, ulog
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
+from chute_ros.transport.regular_file import open_regular
 
 _HEAD = 4096
 KNOWN = "ArduPilot's .bin and .log, .tlog, PX4's .ulg, .bag, .mcap, .db3 or a rosbag2 folder, .csv"
@@ -18,11 +19,8 @@ def read(path: Path, columns: Mapping[str, table.Column]) -> FlightLog:
     """The log in this file, of whatever format; LogError if it is of none, or damaged."""
     if path.is_dir():
         return bag.read(path)
-    if path.exists() and not path.is_file():
-        # A FIFO would be waited for, and a device never ends.
-        raise LogError(f"{path}: it is no file")
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(_HEAD)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None

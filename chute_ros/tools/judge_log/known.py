@@ -4,6 +4,7 @@ that is right."""
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from chute_ros.plain_text import plain
 from chute_ros.tools.judge_log.findings import Verdict
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.pages import table
+from chute_ros.transport.regular_file import read_regular_text
 
 #: What a flight asks for: nothing that ends it; the motors stopped or the parachute released from
 #: a moment on, at the latest at another; either, but nothing before that moment.
@@ -44,8 +46,8 @@ def known_of(path: Path) -> dict[str, Known]:
     """File name -> what is known of it. path: tab-separated, its first line the names of
     _FIELDS. ChuteError, in words: it is none."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file, delimiter="\t"))
+        text = io.StringIO(read_regular_text(path), newline="")
+        rows = list(csv.DictReader(text, delimiter="\t"))
         if not rows or set(rows[0]) != set(_FIELDS):
             raise ChuteError(f"{path}: need the columns {', '.join(_FIELDS)}, parted by tabs")
         found = [_known(row) for row in rows]

@@ -18,6 +18,7 @@ from pathlib import Path
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog
+from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "table"
 #: What a column can be, and the headings (without case, signs, unit and _BESIDES) by which it is
@@ -75,7 +76,8 @@ def column(text: str) -> tuple[str, Column]:
 def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
     """The flight in this file; LogError if it has none."""
     try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
+        with open_regular(path) as file:
+            text = file.read().decode("utf-8-sig", errors="replace")
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
     dialect_of = ";" if text[:4000].count(";") > text[:4000].count(",") else ","

@@ -13,6 +13,7 @@ from typing import Any
 from chute_ros.links.mavlink.protocol.autopilot import is_autopilot
 from chute_ros.protocol.mavlink.frames import MAGIC_V1, MAGIC_V2, FrameDecoder
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, without_gaps
+from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "MAVLink telemetry"
 
@@ -32,7 +33,8 @@ def looks_so(head: bytes) -> bool:
 def read(path: Path) -> FlightLog:
     """The log of the first autopilot in this file; LogError if there is none."""
     try:
-        data = path.read_bytes()
+        with open_regular(path) as file:
+            data = file.read()
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
     every, passed = _frames(data)
