@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -45,7 +46,7 @@ def make_each(
     make (ChuteError); whether all were made. one: what --output is ("one page")."""
     made = True
     try:
-        found = chosen(given.files, given.recording)
+        found = chosen(given.files, given.recording, partial(remark, program))
         if given.output is not None and len(found) > 1:
             text = f"--output is {one}, and these are {len(found)} recordings"
             raise ChuteError(f"{text}: choose one with --recording NUMBER\n{listed(found)}")
@@ -78,6 +79,11 @@ def write_pages(
         print(path, flush=True)
 
     sys.exit(0 if make_each(program, options.parse_args(), "one page", make) else 2)
+
+
+def remark(program: str, text: str) -> None:
+    """On standard error, what is no error."""
+    print(plain(f"{program}: {text}"), file=sys.stderr)
 
 
 def complain(program: str, error: ChuteError) -> None:

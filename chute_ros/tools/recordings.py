@@ -4,7 +4,7 @@ often it started; in a folder each of its starts is one."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,12 +35,19 @@ class RecordingFiles:
         return f"{names}: vehicle {vehicle}, from {utc(self.begin.turn.wall)} UTC"
 
 
-def recordings_of(paths: Iterable[Path]) -> list[RecordingFiles]:
-    """All of them, of each file only its beginning read. RecordError: a named file cannot be
-    read, or a folder has none."""
+def recordings_of(
+    paths: Iterable[Path], tell: Callable[[str], object] = lambda _: None
+) -> list[RecordingFiles]:
+    """All of them, of each file only its beginning read. A file that is given again, by whatever
+    name, is left out, which tell is called with. RecordError: a named file cannot be read, or a
+    folder has none."""
     found: list[RecordingFiles] = []
+    known: dict[tuple[int, int], Path] = {}
     for path in paths:
         for file in files_of([path]):
+            if (earlier := _known(file, known)) is not None:
+                tell(f"{file} is the same file as {earlier}: read once")
+                continue
             one = _begun(file) if path.is_dir() else _only(file, beginning(file))
             same = (other for other in reversed(found) if other.supervisor == one.supervisor)
             former = next(same, None)
@@ -51,9 +58,12 @@ def recordings_of(paths: Iterable[Path]) -> list[RecordingFiles]:
     return found
 
 
-def chosen(paths: Iterable[Path], number: int | None) -> list[RecordingFiles]:
-    """The recording with this number, from 1; without one all of them. ChuteError: none has it."""
-    found = recordings_of(paths)
+def chosen(
+    paths: Iterable[Path], number: int | None, tell: Callable[[str], object]
+) -> list[RecordingFiles]:
+    """The recording with this number, from 1; without one all of them. tell: as recordings_of has
+    it. ChuteError: none has it."""
+    found = recordings_of(paths, tell)
     if number is None:
         return found
     if not 1 <= number <= len(found):
@@ -64,6 +74,17 @@ def chosen(paths: Iterable[Path], number: int | None) -> list[RecordingFiles]:
 def listed(found: Iterable[RecordingFiles]) -> str:
     """A numbered line for each."""
     return "\n".join(f"{number:4}  {one}" for number, one in enumerate(found, 1))
+
+
+def _known(file: Path, known: dict[tuple[int, int], Path]) -> Path | None:
+    """The name under which it is known already; from now on it is."""
+    try:
+        about = file.stat()
+    except OSError:
+        return None  # who reads it tells why not
+    former = known.get((about.st_dev, about.st_ino))
+    known.setdefault((about.st_dev, about.st_ino), file)
+    return former
 
 
 def _begun(file: Path) -> RecordingFiles:

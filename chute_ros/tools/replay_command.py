@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from chute_ros.tools.page_file import SVG, write_page
 from chute_ros.tools.parameter_file import NODE, other_from
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, read
-from chute_ros.tools.recording_options import complain, recording_options
+from chute_ros.tools.recording_options import complain, recording_options, remark
 from chute_ros.tools.recordings import chosen, listed
 from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
@@ -55,7 +56,7 @@ def main() -> None:
 
 
 def _files(paths: list[Path], number: int | None) -> list[Path]:
-    found = chosen(paths, number)
+    found = chosen(paths, number, partial(remark, "replay"))
     if len(found) > 1:
         text = f"{len(found)} recordings: choose one with --recording NUMBER, or name its files"
         raise ChuteError(f"{text}\n{listed(found)}")
@@ -66,8 +67,8 @@ def _replay(files: list[Path], config: Path | None, wanted: Path | None) -> int:
     recording = read(files, {})
     require_replayable(recording.turns)
     other = other_from(config, f"{recording.namespace}/{NODE}") if config else None
-    for remark in recording.remarks:
-        print(f"remark: {plain(remark)}")
+    for one in recording.remarks:
+        print(f"remark: {plain(one)}")
     if other is not None:
         _print_settings(recording, other)
     then, now = Replayer(), Replayer(other)

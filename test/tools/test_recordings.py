@@ -111,6 +111,17 @@ def test_named_files_of_one_supervisor_are_one_recording_and_its_starts_are_told
     assert "20 turns replayed" in out
 
 
+def test_a_file_that_is_given_again_is_read_once(folder, tmp_path, monkeypatch, capsys):
+    file, link = folder / NAMES[0], tmp_path / "link.mcap"
+    link.symlink_to(file)
+    assert run(replay.main, monkeypatch, file, file, link) == 0
+    told = capsys.readouterr()
+    assert "10 turns replayed" in told.out
+    assert told.err.splitlines() == [
+        f"replay: {again} is the same file as {file}: read once" for again in (file, link)
+    ]
+
+
 def test_named_files_of_several_vehicles_are_not_mixed(folder, monkeypatch, capsys):
     assert run(replay.main, monkeypatch, folder / NAMES[0], folder / NAMES[3]) == 2
     assert "replay: 2 recordings: choose one" in capsys.readouterr().err
