@@ -670,6 +670,18 @@ def test_a_domain_that_cannot_be_is_a_mistake(monkeypatch, domain):
     assert done.stderr == told
 
 
+@pytest.mark.parametrize("given", ["FOO", "LOCALHOST ", "localhost"])
+def test_a_discovery_range_that_cannot_be_is_a_mistake(monkeypatch, given):
+    """ROS would take another one."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", given)
+    done = subprocess.run(
+        [*COMMAND, "status"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    need = "need OFF, LOCALHOST, SUBNET or SYSTEM_DEFAULT"
+    assert done.stderr == f"chute: ROS_AUTOMATIC_DISCOVERY_RANGE is {given!r}: {need}\n"
+
+
 def test_a_middleware_that_is_not_installed_is_a_mistake(monkeypatch):
     """ROS itself would end the process."""
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nothing")
@@ -699,7 +711,7 @@ def test_the_doctor_finds_nothing_wrong_with_a_sound_vehicle(ready):
     lines = out.splitlines()
     assert (code, err, [line for line in lines if line.startswith("WRONG")]) == (0, "", []), out
     assert f"OK     supervisor of {ready.bench.namespace}: safety_supervisor" in lines
-    # The stub of a link has no diagnostics.
+    # The stub of a link does not tell its version.
     silent = "NOTE   no version of chute_ros is received of mavlink_parachute -> "
     assert [line for line in lines if line.startswith(silent)]
     assert any(line.startswith("OK     versions: chute_ros ") for line in lines)

@@ -11,7 +11,9 @@ from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
 
 #: Fast DDS has no ports for a higher domain.
 _HIGHEST_DOMAIN = 232
+_RANGES = ("OFF", "LOCALHOST", "SUBNET", "SYSTEM_DEFAULT")
 _OLD_RANGE = "ROS_LOCALHOST_ONLY"
+_DEFAULT_RANGE, _OLD_LOCALHOST = "SUBNET (the default)", f"LOCALHOST ({_OLD_RANGE})"
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,9 @@ class Surroundings:
         if not whole:
             need = f"need a whole number from 0 to {_HIGHEST_DOMAIN}"
             return f"ROS_DOMAIN_ID is {domain[:40]!r}: {need}"
+        if self.discovery_range not in (*_RANGES, _DEFAULT_RANGE, _OLD_LOCALHOST):
+            need = f"need {', '.join(_RANGES[:-1])} or {_RANGES[-1]}"
+            return f"{RANGE} is {self.discovery_range[:40]!r}: {need}"
         if self.installed and self.middleware not in self.installed:
             # ROS ends the process without asking.
             need = f"need one that is installed: {', '.join(self.installed)}"
@@ -57,9 +62,9 @@ def installed_middlewares() -> list[str]:
 
 def surroundings(environment: Mapping[str, str], installed: Collection[str]) -> Surroundings:
     """Of this environment."""
-    given = environment.get(RANGE) or "SUBNET (the default)"
+    given = environment.get(RANGE) or _DEFAULT_RANGE
     if environment.get(_OLD_RANGE) == "1":
-        given = f"LOCALHOST ({_OLD_RANGE})"
+        given = _OLD_LOCALHOST
     return Surroundings(
         environment.get("ROS_DOMAIN_ID") or "0",
         given,
