@@ -5,6 +5,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+import yaml
 
 from chute_ros.tools import parameter_docs
 
@@ -31,13 +32,20 @@ def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_bytes()) <= 8000
 
 
-def test_every_executable_is_in_the_reference() -> None:
-    pages = [ROOT / "docs/reference/interfaces.md", *(ROOT / "docs/guide").glob("*.md")]
-    text = "".join(page.read_text() for page in pages)
+def test_the_table_of_executables_has_each_and_no_other() -> None:
+    text = (ROOT / "docs/reference/interfaces.md").read_text()
+    table = text.partition("## Executables")[2].partition("\n## ")[0]
+    named = re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE)
     installed = entry_points(group="console_scripts")
-    scripts = [one.name for one in installed if one.value.startswith("chute_ros.")]
+    scripts = {one.name for one in installed if one.value.startswith("chute_ros.")}
     assert len(scripts) >= 12
-    assert [name for name in scripts if f"`{name}`" not in text] == []
+    assert sorted(named) == sorted(scripts)
+
+
+def test_the_guide_shows_as_many_rules_as_a_multirotor_has() -> None:
+    profile = yaml.safe_load((ROOT / "config/profiles/multirotor.yaml").read_text())
+    shown = re.findall(r"rules: \d+ of (\d+) active", (ROOT / "docs/guide/command.md").read_text())
+    assert {*map(int, shown)} == {len(profile["rules"])}
 
 
 def test_the_table_of_measurements_is_up_to_date() -> None:
