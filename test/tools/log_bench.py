@@ -10,11 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from chute_msgs.msg import VehicleState
+from mcap.writer import Writer as McapWriter
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.ros.message_definitions import definition
 from chute_ros.sim.autopilot_device import AutopilotDevice
 
 ROOT = Path(__file__).parents[2]
@@ -321,6 +325,21 @@ def vehicle_state(told: Iterable[Told], path: Path) -> Path:
     return path
 
 
+def black_box(told: Iterable[Told], path: Path) -> Path:
+    """A file of a black box with vehicle/state, in chunks as it writes them."""
+    folder = vehicle_state(told, path.with_name(f"{path.name}.folder"))
+    text = definition(VehicleState)
+    with AnyReader([folder]) as reader, path.open("wb") as file:
+        writer = McapWriter(file, chunk_size=20_000)
+        writer.start("ros2", "test")
+        schema = writer.register_schema("chute_msgs/msg/VehicleState", "ros2msg", text.encode())
+        channel = writer.register_channel("/drone1/vehicle/state", "cdr", schema)
+        for _, time, raw in reader.messages():
+            writer.add_message(channel, time, bytes(raw), time)
+        writer.finish()
+    return path
+
+
 def _parts_of_state(message: Any) -> dict[str, dict[str, Any]]:
     kind = message.get_type()
     if kind == "HEARTBEAT":
@@ -353,4 +372,5 @@ FORMATS: dict[str, Write] = {
     "flight.ulg": ulog,
     "mavros": mavros,
     "suite": vehicle_state,
+    "box.mcap": black_box,
 }

@@ -13,12 +13,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from mcap.records import Schema
+
+from chute_ros.errors import RecordError
 from chute_ros.model import Armed, LandedState
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.mcap_entries import McapEntries
 
 FORMAT = "ROS recording"
 
@@ -54,8 +58,10 @@ def read(path: Path) -> FlightLog:
         raise LogError(
             f"{path}: a recording of ROS needs the package rosbags: python3 -m pip install rosbags"
         ) from None
-    folder = path if path.suffix in (".bag", ".mcap") or path.is_dir() else path.parent
+    folder = path if path.suffix == ".bag" or path.is_dir() else path.parent
     teller = _Teller()
+    if path.suffix == ".mcap":
+        return _of_mcap(path, teller)
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _end_of(one.topic)]
@@ -70,6 +76,47 @@ def read(path: Path) -> FlightLog:
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes of its reader
         raise LogError(f"{path}: no recording of ROS that can be read: {reason(error)}") from None
     return teller.log(path)
+
+
+def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
+    """By our own reader, which takes what a power cut has left, as of a black box."""
+    entries = McapEntries(path)
+    try:
+        chosen = [one for one in entries if _end_of(one.channel.topic)]
+    except RecordError as error:
+        raise LogError(f"no recording of ROS that can be read: {error}") from None
+    definitions: dict[int, Any] = {}
+    for entry in sorted(chosen, key=lambda one: one.time):
+        schema = entry.schema
+        if schema.id not in definitions:
+            definitions[schema.id] = _definition(schema)
+        try:
+            message = definitions[schema.id].deserialize_cdr(entry.data, schema.name)
+        except Exception:  # noqa: BLE001 - whatever damage makes of its reader
+            teller.unknown.add(schema.name)
+            continue
+        teller.take(_end_of(entry.channel.topic), message, entry.time * _NANO)
+    log = teller.log(path)
+    log.remarks.extend(entries.remarks)
+    return log
+
+
+def _definition(schema: Schema) -> Any:
+    """What reads a message of it: by its own definition, or that of ROS where it has none."""
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    text = schema.data.decode("utf-8", errors="replace")
+    store = get_typestore(Stores.EMPTY)
+    try:
+        if schema.encoding == "ros2msg":
+            store.register(get_types_from_msg(text, schema.name))
+        elif schema.encoding == "ros2idl":
+            parts = text.split("=" * 80 + "\n")
+            for part in parts[1:] or parts:
+                store.register(get_types_from_idl(part.partition("\n")[2] if parts[1:] else part))
+    except Exception:  # noqa: BLE001 - whatever damage makes of its reader
+        pass  # as one without
+    return store if schema.name in store.fielddefs else get_typestore(Stores.ROS2_JAZZY)
 
 
 def _end_of(topic: str) -> str:
