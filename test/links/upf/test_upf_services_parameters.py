@@ -81,7 +81,7 @@ def test_protection_is_switched_off_in_the_air_only_by_force_and_that_is_logged(
     devices.fly()
     answer = set_param(bench, name, "nonsense")
     assert (answer.success, answer.value_read_back) == (False, "")
-    without = f"{name} off would leave the vehicle without protection in the air"
+    without = f"{name} may take the parachute away in the air"
     assert without in answer.message
     assert devices.controller.values[name] is True
     answer = set_param(bench, name, "false", force=True)

@@ -24,9 +24,14 @@ class BusRequestTracker:
     """Every bus request ends in one BusRequestFinished with its token."""
 
     def __init__(
-        self, bus: BusNode, devices: DeviceTable, in_air: Callable[[float], bool]
+        self,
+        bus: BusNode,
+        devices: DeviceTable,
+        in_air: Callable[[float], bool],
+        status_timeout: float,
     ) -> None:
         self._bus, self._devices, self._in_air = bus, devices, in_air
+        self._status_timeout = status_timeout
         #: Controller -> when its parameters are to be read again.
         self._read_again: dict[int, float] = {}
         #: Controllers whose parameters are being read.
@@ -47,19 +52,21 @@ class BusRequestTracker:
     def set_parameter(
         self, token: int, node_id: int, name: str, text: str, force: bool, now: float
     ) -> None:
-        """Set one and read it back; what takes protection away is refused in the air."""
+        """Set one and read it back; in the air it needs force, but for what only lights."""
+        if name != p.LIGHT and self._in_air(now) and not force:
+            why = (
+                f"{name} may take the parachute away in the air; force does it all the same; "
+                "nothing was sent"
+            )
+            self._refuse(token, node_id, why)
+            return
         if name in p.PROTECTION and not p.switches_on(text):
-            if self._in_air(now) and not force:
-                why = (
-                    f"{name} off would leave the vehicle without protection in the air; force "
-                    "does it all the same; nothing was sent"
-                )
-                self._refuse(token, node_id, why)
-                return
             self._devices.notice(Severity.WARNING, f"{name} is being switched off")
 
         def make(target: int) -> BusRequest:
-            return bus_requests.set_parameter(target, name, text, lambda: self._keeps(target))
+            return bus_requests.set_parameter(
+                target, name, text, lambda: self._keeps(target), self._status_timeout
+            )
 
         self.bus_request(token, node_id, make, now)
 

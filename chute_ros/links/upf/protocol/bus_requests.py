@@ -6,6 +6,7 @@ uavcan.protocol.param.GetSet, param.ExecuteOpcode, GetTransportStats, GetNodeInf
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -61,10 +62,14 @@ def get_parameter(node_id: int, name: str) -> BusRequest:
 
 
 def set_parameter(
-    node_id: int, name: str, text: str, auto_save: Callable[[], bool | None] = lambda: None
+    node_id: int,
+    name: str,
+    text: str,
+    auto_save: Callable[[], bool | None] = lambda: None,
+    status_timeout: float = math.inf,
 ) -> BusRequest:
     """Read one for its type and range, set it, and read it back. auto_save: whether the device
-    keeps a change by itself; None: not known."""
+    keeps a change by itself; None: not known. status_timeout: of ParachuteStatus, s."""
     before = yield from _find(node_id, name)
     if isinstance(before, BusRequestDone):
         return before
@@ -100,6 +105,11 @@ def set_parameter(
     if keeps is not None:
         lost = f"lost at a restart until ~/save_params: {p.AUTO_SAVE} is off"
         text += "; kept" if keeps else f"; {lost}"
+    if name == p.PARACHUTE_STATUS_INTERVAL and _below(status_timeout * 1000.0, after.value):
+        text += (
+            f"; WARNING: status_timeout is {status_timeout:g} s: need a shorter interval, or each "
+            "ParachuteStatus is too old and the controller ABNORMAL"
+        )
     return BusRequestDone(True, text, node_id, (after,))
 
 

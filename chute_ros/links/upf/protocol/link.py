@@ -50,7 +50,9 @@ class UpfLink:
         self._deploying = Deploying(
             config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
         )
-        self._desk = BusRequestTracker(self.bus, self.devices, self._vehicle.in_air)
+        self._desk = BusRequestTracker(
+            self.bus, self.devices, self._vehicle.in_air, config.status_timeout
+        )
         #: Our own requests to take off count down from -1; once one has succeeded, the request
         #: with this token arms this controller.
         self._next_takeoff = -1
@@ -227,7 +229,7 @@ class UpfLink:
     def set_parameter(
         self, token: int, node_id: int, name: str, text: str, force: bool, now: float
     ) -> None:
-        """Set one and read it back; what takes protection away is refused in the air."""
+        """Set one and read it back; in the air it needs force."""
         self._desk.set_parameter(token, node_id, name, text, force, now)
         self._drive(now)
 

@@ -332,12 +332,36 @@ def test_protection_is_switched_off_in_the_air_only_by_force_which_is_said_loudl
     assert story.bus_request(1).success
     assert f"{name} is being switched off" in story.notices()
     assert any(f"{name} is off" in fault for fault in story.picture().faults)
-    # On the ground without force, and on anywhere.
+    # On the ground without force; on is told by nobody.
     story = set_it(bench().ready(), name, "false")
     assert story.bus_request(1).success
     story.call("vehicle", flying()).clear()
-    assert set_it(story, name, "true", token=2).bus_request(2).success
+    assert set_it(story, name, "true", force=True, token=2).bus_request(2).success
     assert not story.notices()
+
+
+@pytest.mark.parametrize("name", [one.name for one in p.PARAMETERS if one.name != p.LIGHT])
+def test_any_parameter_but_the_light_needs_force_in_the_air(bench, name):
+    """Each may take the automatic deployment, the status or the node away, also where it is on."""
+    story = bench().in_flight()
+    before = dict(story.controller.values)
+    for token, text in enumerate(("0", "1", "1000"), start=2):
+        done = set_it(story, name, text, token=token).bus_request(token)
+        assert not done.success
+        assert done.message.startswith(f"{name} may take the parachute away in the air; force")
+    assert not story.requests(GET_SET)
+    assert story.controller.values == before
+    assert set_it(story, name, "1000" if "(ms)" in name else "1", True).bus_request(1).success
+
+
+def test_interval_longer_than_the_status_timeout_is_set_with_a_warning(bench):
+    story = bench().ready()
+    done = set_it(story, p.PARACHUTE_STATUS_INTERVAL, "10000").bus_request(1)
+    assert done.success
+    assert "WARNING: status_timeout is 1.5 s" in done.message
+    done = set_it(story, p.PARACHUTE_STATUS_INTERVAL, "1000", token=2).bus_request(2)
+    assert done.success
+    assert "WARNING" not in done.message
 
 
 @pytest.mark.parametrize(
