@@ -44,6 +44,14 @@ _FLAGS = {
     "LOW_POWER": ErrorFlags.LOW_POWER,
     "VEHICLE_CONNECTION": ErrorFlags.FC_CONNECTION_ERROR,
 }
+#: Of any other error, which must not pass for none: MAVLink's "fault of the parachute pod".
+_ANY_OTHER = ErrorFlags.POD_CONNECTION_ERROR
+_DISABLED = "PARACHUTE_DISABLED"
+
+
+def _error_name(told: str) -> str:
+    """Told by a bit's name (IMU) or by that of a field of its own (error_imu)."""
+    return told.upper().removeprefix("ERROR_")
 
 
 def mode_name(mode: int) -> str:
@@ -262,7 +270,7 @@ class Controller(Device):
     def faults(self, now: float) -> list[str]:
         """What is wrong, in words."""
         faults = self.link_faults(now, "ParachuteStatus")
-        told = self.definitions.faults(names.PARACHUTE_STATUS, self.values)
+        told = self._told_errors()
         faults += told
         if self.state is ParachuteState.ABNORMAL and not told:
             faults.append("state ABNORMAL")
@@ -279,16 +287,18 @@ class Controller(Device):
 
     @property
     def never_deploys(self) -> bool:
-        """Its global switch is off."""
-        return self.switch(p.ENABLE_PARACHUTE) is False
+        """Its global switch is off, by its parameter or its status."""
+        told = map(_error_name, self._told_errors())
+        return self.switch(p.ENABLE_PARACHUTE) is False or _DISABLED in told
+
+    def _told_errors(self) -> list[str]:
+        return self.definitions.faults(names.PARACHUTE_STATUS, self.values)
 
     def status(self, now: float, triggers: list[Trigger]) -> ParachuteStatus:
         """The normalised picture at now, with those of its triggers that are there."""
-        told = self.definitions.faults(names.PARACHUTE_STATUS, self.values)
         flags = ErrorFlags(0)
-        for one in told:
-            # By a bit's name (IMU) or by that of a field of its own (error_imu).
-            flags |= _FLAGS.get(one.upper().removeprefix("ERROR_"), ErrorFlags(0))
+        for one in self._told_errors():
+            flags |= _FLAGS.get(_error_name(one), _ANY_OTHER)
         fired = any(trigger.launched and trigger.alive for trigger in triggers)
         faults = self.faults(now)
         for trigger in triggers:

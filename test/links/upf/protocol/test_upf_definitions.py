@@ -177,3 +177,27 @@ def test_error_has_its_flag_in_the_picture_in_either_form():
         picture = Bench(layout_of(layout), "").status("ABNORMAL", **said).picture()
         assert picture.error_flags == ErrorFlags.IMU_ERROR | ErrorFlags.BAROMETER_ERROR
         assert len(picture.faults) == 2, layout
+
+
+@pytest.mark.parametrize(
+    ("layout", "said", "name"),
+    [
+        ("ours", {"error_flags": 32}, "PARACHUTE_DISABLED"),
+        ("ours", {"error_flags": 64}, "error bit 6"),
+        ("ours", {"error_flags": 128}, "error bit 7"),
+        ("other", {"error_trigger_connection": True}, "error_trigger_connection"),
+    ],
+)
+def test_error_without_a_flag_of_its_own_is_an_error_all_the_same(layout, said, name):
+    """Pre-flight checks look at the flags; the name stays in words."""
+    picture = Bench(layout_of(layout), "").status("READY", **said).picture()
+    assert picture.error_flags == ErrorFlags.POD_CONNECTION_ERROR
+    assert picture.faults == (name,)
+
+
+def test_a_controller_that_tells_that_it_is_disabled_never_deploys():
+    """Given one whose parameters cannot be read."""
+    story = Bench(layout_of("ours"), "").status("READY", error_flags=32)
+    assert story.link.devices.controllers[33].never_deploys
+    assert story.picture().state is ParachuteState.ABNORMAL
+    assert not story.status("READY").link.devices.controllers[33].never_deploys
