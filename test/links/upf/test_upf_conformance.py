@@ -162,6 +162,47 @@ def _changed(
     return {**make(), field: next(every)}
 
 
+def _clamps(controller: UpfController, low: int, high: int) -> None:
+    """It takes the nearest value in place of one that is out of its range."""
+    right = controller.memory.set
+
+    def clamp(name: str, wanted: p.Value) -> bool:
+        if name == p.NODE_STATUS_INTERVAL and isinstance(wanted, (int, float)):
+            wanted = min(max(wanted, low), high)
+        return right(name, wanted)
+
+    controller.memory.set = clamp  # type: ignore[method-assign]
+
+
+def test_a_controller_that_takes_the_nearest_value_is_as_good_as_one_that_refuses() -> None:
+    run = Run(Risk.NONE)
+    _clamps(run.controller, 2, 1000)
+    run.line.run()
+    result = results(run.line)["parameter-range"]
+    assert result.verdict is Verdict.PASSED
+    assert result.why.endswith("is 2 and 1000")
+    assert run.controller.values == CONTROLLER_PARAMETERS
+
+
+def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None:
+    """Given a controller that takes 1 where it tells that 2 is the least."""
+    run = Run(Risk.NONE)
+    right = run.controller.services[bus_requests.GET_SET]
+
+    def answer(request: Heard) -> dict[str, object] | None:
+        wanted = p.value_of(request.values["value"])
+        if isinstance(wanted, int) and wanted < 0:
+            run.controller.memory.values[p.NODE_STATUS_INTERVAL] = 1
+            return run.controller.memory.answer(p.NODE_STATUS_INTERVAL)
+        return right(request)
+
+    run.controller.services[bus_requests.GET_SET] = answer
+    run.line.run()
+    assert results(run.line)["parameter-range"].verdict is Verdict.FAILED
+    assert run.controller.values == CONTROLLER_PARAMETERS
+    assert run.problem == ""
+
+
 # -- what it must not do -------------------------------------------------------------------------
 
 

@@ -220,28 +220,43 @@ def _set_status_interval(bench: UpfBench) -> Trial:
 
 
 def _set_interval(bench: UpfBench, name: str, wanted: int, kind: str) -> Trial:
-    if (told := (yield from bench.set(name, wanted))) != wanted:
-        raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not told'}")
-    yield from bench.watch(8.0 * wanted / 1000.0)
-    mean = _mean(bench, kind)
+    if (told := (yield from bench.set(name, wanted))) == wanted:
+        yield from bench.watch(8.0 * wanted / 1000.0)
     yield from bench.put_back(name)
+    if told != wanted:
+        raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not told'}")
+    mean = _mean(bench, kind)
     if abs(mean - wanted / 1000.0) > max(_SHARE * wanted / 1000.0, _LEAST):
         raise failed(f"{wanted} ms were set, and it comes each {mean:.3f} s", bench.packets(kind))
     return f"{wanted} ms were set, it comes each {mean:.3f} s"
 
 
 def _range(bench: UpfBench) -> Trial:
+    """A device may keep what it has, or take the nearest that can be."""
     name = p.NODE_STATUS_INTERVAL
-    before = yield from bench.value(name)
+    answer = yield from bench.get(name)
+    before = None if answer is None else p.value_of(answer["value"])
     if before is None:
         raise failed(f"{name} is not told")
+    low, high = p.value_of(answer["min_value"]), p.value_of(answer["max_value"])
+    became = []
     for wrong in (-5, 10**9):
-        if (told := (yield from bench.set(name, wrong))) == wrong:
-            yield from bench.put_back(name)
+        told = yield from bench.set(name, wrong)
+        yield from bench.put_back(name)
+        if told == wrong:
             raise failed(f"{name} takes {wrong}")
-        if told != before:
-            raise failed(f"{name} {wrong} is refused, and {before} became {p.words(told)}")
-    return f"{name} stays {p.words(before)}"
+        if told != before and not _within(told, low, high):
+            raise failed(
+                f"{name} was set to {wrong}, and {before} became {p.words(told) or 'not told'}"
+            )
+        became.append(p.words(told))
+    return f"{name} set to -5 and 1000000000 is {' and '.join(became)}"
+
+
+def _within(value: p.Value | None, low: p.Value | None, high: p.Value | None) -> bool:
+    """Within the limits that a device tells; one that tells none has none to take."""
+    numbers = [one for one in (low, value, high) if isinstance(one, (int, float))]
+    return len(numbers) == 3 and numbers[0] <= numbers[1] <= numbers[2]
 
 
 def _opcode(bench: UpfBench) -> Trial:
