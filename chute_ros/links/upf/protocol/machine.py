@@ -68,21 +68,28 @@ BLOCKING = frozenset(state for state, name in ENTRY_REQUESTS.items() if name.end
 #: The parachute is out.
 DEPLOYED = frozenset({_S.LAUNCHED, _S.TOUCHDOWN})
 
-_CAUSES: dict[tuple[ParachuteState, ParachuteState], list[Event]] = {}
-for (_before, _stimulus), _after in TRANSITIONS.items():
-    _CAUSES.setdefault((_before, _after), []).append(_stimulus)
+
+def _reached(before: ParachuteState) -> frozenset[ParachuteState]:
+    """The states that steps of the table lead to from this one, without a restart on the way: that
+    would explain everything."""
+    reached, left = {before}, [before]
+    while left:
+        here = left.pop()
+        for (state, event), following in TRANSITIONS.items():
+            if state is here and event is not Event.RESTART and following not in reached:
+                reached.add(following)
+                left.append(following)
+    return frozenset(reached)
 
 
-def causes(before: ParachuteState, after: ParachuteState) -> list[Event]:
-    """What can have moved a controller from before to after; empty: nothing in the table.
-
-    The first state that is heard needs no cause.
-    """
-    if before is after or before is ParachuteState.UNKNOWN:
-        return []
-    return list(_CAUSES.get((before, after), ()))
+_REACHED = {state: _reached(state) for state in ParachuteState}
 
 
 def is_known_jump(before: ParachuteState, after: ParachuteState) -> bool:
-    """Nothing to wonder about."""
-    return before in (after, ParachuteState.UNKNOWN) or bool(causes(before, after))
+    """Nothing to wonder about: a restart, one step of the table, or several between two statuses.
+
+    The first state that is received needs no cause.
+    """
+    if before is ParachuteState.UNKNOWN or after is ParachuteState.NOT_READY:
+        return True
+    return after in _REACHED[before]

@@ -31,7 +31,11 @@ WANTED = {
     (S.ABNORMAL, Event.TRIGGER_FIRED): S.LAUNCHED,
     **RESTARTS,
 }
-JUMPS = {(before, after) for (before, _), after in WANTED.items()}
+#: After the parachute is out only a restart leads back.
+NOT_IN_DOCUMENT = {
+    *itertools.product((S.LAUNCHED, S.TOUCHDOWN), (S.READY, S.TAKEOFF, S.ARMED, S.ABNORMAL)),
+    (S.TOUCHDOWN, S.LAUNCHED),
+}
 
 
 def test_states_are_numbered_as_in_the_document():
@@ -51,16 +55,13 @@ def test_pair_of_state_and_stimulus_moves_or_raises():
                 after(machine.TRANSITIONS, state, event)
 
 
-def test_jump_is_known_if_the_table_has_a_cause_for_it():
-    for before, now in itertools.product(S, S):
-        listed = (before, now) in JUMPS
-        known = before in (now, S.UNKNOWN) or listed
+def test_jump_is_known_if_steps_of_the_table_lead_to_it():
+    """READY to ARMED passes TAKEOFF, for less than the interval of the status."""
+    for before, now in itertools.product(NAMED, NAMED):
+        known = (before, now) not in NOT_IN_DOCUMENT
         assert machine.is_known_jump(before, now) is known, (before, now)
-        moved = before not in (now, S.UNKNOWN)
-        assert bool(machine.causes(before, now)) is (moved and listed), (before, now)
-    assert machine.causes(S.READY, S.TAKEOFF) == [Event.TAKEOFF]
-    assert set(machine.causes(S.ABNORMAL, S.READY)) == {Event.FAULT_CLEARED}
-    assert machine.causes(S.TOUCHDOWN, S.NOT_READY) == [Event.RESTART]
+        assert machine.is_known_jump(S.UNKNOWN, now)
+        assert not machine.is_known_jump(before, S.UNKNOWN)
 
 
 def test_requests_on_entering_a_state_are_those_of_the_document():
@@ -79,7 +80,7 @@ def test_jump_is_followed_and_reported_if_the_table_does_not_know_it(bench):
     for before, now in itertools.product(NAMED, NAMED):
         story = bench("").status(before.name).clear().status(now.name)
         controller = story.link.devices.controllers[33]
-        unknown = before is not now and (before, now) not in JUMPS
+        unknown = (before, now) in NOT_IN_DOCUMENT
         jump = f"{before.name} to {now.name}"
         assert (controller.state, controller.unknown_jumps) == (now, int(unknown)), jump
         told = [text for text in story.notices() if "controller 33" in text]
