@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -16,6 +17,9 @@ from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
 from chute_ros.transport.loop import WireLoop
 
+#: After the end of a pulse its output is written by then, or cannot be, s.
+_REST_WITHIN = 1.0
+
 
 class RelayNode(DeviceNode):
     """The node relay."""
@@ -28,6 +32,16 @@ class RelayNode(DeviceNode):
         self.carry(RelayRuntime(self.get_name(), settings, self, details_of))
         self.loop = WireLoop(link, wire, self.deliver, link.wire_opened, link.not_written)
         self.begin()
+
+    def destroy_node(self) -> None:
+        """A pulse under way is given its time, and the output is put to rest: it would fire on."""
+        if self.loop is not None:
+            link: RelayLink = self.loop.link
+            within = link.config.repeat_interval + _REST_WITHIN
+            began = time.monotonic()
+            while not link.at_rest and time.monotonic() < max(began, link.fires_until) + within:
+                time.sleep(0.01)
+        super().destroy_node()
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None

@@ -87,6 +87,24 @@ def test_a_deploy_is_one_pulse_repeated_for_its_time_and_then_rest():
     assert output.link.fired == 1
 
 
+def test_it_is_at_rest_once_the_rest_after_the_pulse_was_taken():
+    """Whoever ends the link waits for it."""
+    output = Output(RelayConfig(pulse_time=0.35))
+    assert output.link.at_rest
+    output.deploy()
+    assert not output.link.at_rest, "ordered, and not written yet"
+    output.open()
+    output.to(0.3)
+    assert not output.link.at_rest
+    output.takes = False
+    output.to(0.6)
+    assert not output.link.at_rest, "it may fire still"
+    output.takes = True
+    output.to(1.5)
+    assert output.written[-1][1] == REST
+    assert output.link.at_rest
+
+
 def test_a_second_deploy_in_the_pulse_makes_it_longer():
     output = Output(RelayConfig(pulse_time=1.0, repeat_interval=0.125))
     output.open()

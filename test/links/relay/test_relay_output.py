@@ -1,9 +1,14 @@
 """The output as a file or a serial port, and the parameters that name it."""
 
 import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
+from chute_msgs.srv import Deploy
 from relay_bench import Board
 
 from chute_ros.errors import ParameterError
@@ -47,6 +52,30 @@ def test_a_pipe_is_an_output_while_somebody_reads_it(tmp_path):
     with pytest.raises(ConnectionError):
         wire.write(b"1")
     wire.close()
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_that_is_stopped_in_a_pulse_ends_after_it_and_at_rest(bench, tmp_path, by):
+    path = tmp_path / "value"
+    path.write_text("9")
+    command = [sys.executable, "-m", "chute_ros.links.relay", "--ros-args"]
+    command += ["-r", f"__ns:={bench.namespace}"]
+    for name, value in (("connection", f"file:{path}"), ("output_fire", "'1'")):
+        command += ["-p", f"{name}:={value}"]
+    command += ["-p", "output_rest:='0'", "-p", "pulse_time:=1.5"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as node:
+        bench.until(lambda: path.read_text() == "0", "it rests")
+        bench.call(Deploy, "relay/deploy", force=True, reason="a test")
+        began = time.monotonic()
+        assert path.read_text() == "1"
+        node.send_signal(by)
+        while time.monotonic() < began + 1.2:
+            assert path.read_text() == "1", "the pulse has its time"
+            time.sleep(0.05)
+        _, errors = node.communicate(timeout=10.0)
+    assert path.read_text() == "0"
+    assert node.returncode == 0, errors
+    assert "Traceback" not in errors
 
 
 def test_what_is_not_taken_whole_is_not_taken(tmp_path):

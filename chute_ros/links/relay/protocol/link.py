@@ -100,7 +100,10 @@ class RelayLink(EventLog):
         self._is_open = False
         #: Token of each deploy that was not written yet -> when it fails.
         self._waiting: dict[int, float] = {}
-        self._fires_until = -math.inf
+        #: A pulse ends then, monotonic s, with the next write.
+        self.fires_until = -math.inf
+        #: No deploy is left to be written, and no pulse is left without the rest after it.
+        self.at_rest = True
         self._write_at = math.inf
         self._picture_at = -math.inf
         self._now = -math.inf
@@ -133,7 +136,7 @@ class RelayLink(EventLog):
     def update(self, now: float) -> None:
         self._now = now
         if self._is_open and now >= self._write_at:
-            fires = bool(self._waiting) or now < self._fires_until
+            fires = bool(self._waiting) or now < self.fires_until
             self._output.append(self.config.fire if fires else self.config.rest)
             wait = self.config.repeat_interval if fires else self.config.output_check_interval
             self._write_at = now + wait
@@ -180,6 +183,7 @@ class RelayLink(EventLog):
             text = "a relay output cannot tell air from ground: nothing was sent (force fires it)"
             self._end(token, Outcome.FAILED, text)
             return
+        self.at_rest = False
         self._waiting[token] = now + self.config.give_up_after
         self._write_at = now
         self.update(now)
@@ -191,11 +195,12 @@ class RelayLink(EventLog):
         if given:
             self.written_at = self._now
             self._to(LinkState.UNMONITORED)
+            self.at_rest = not self._waiting and given[-1] == self.config.rest
         if self.config.fire not in given or not self._waiting:
             return
         self.fired += 1
         self.fired_at = self._now
-        self._fires_until = self._now + self.config.pulse_time
+        self.fires_until = self._now + self.config.pulse_time
         # Nothing ever reports that the parachute is out: a person has to look.
         self._events.append(AskSupervisor(Ask.FLIGHT_BLOCK, DEVICE, _FIRED))
         waiting, self._waiting = self._waiting, {}
