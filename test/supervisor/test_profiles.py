@@ -325,7 +325,7 @@ def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(
 def test_a_level_pass_at_the_height_of_the_take_off_has_not_tipped_over(
     force: float, fired: list[str]
 ) -> None:
-    """At 63 degrees of bank, as no target tells: PX4 in acro, or a source besides the autopilot."""
+    """At 63 degrees of bank, where no target is told: PX4 in acro, or another source."""
     story = Story(shipped("multirotor")).ready().fly(1.0, height=30.0).fly(9.0, height=2.0)
     story.fly(12.0, height=2.0, tilt=63.0, acceleration=force)
     assert story.fired() == fired
