@@ -287,9 +287,11 @@ class Controller(Device):
 
     @property
     def never_deploys(self) -> bool:
-        """Its global switch is off, by its parameter or its status."""
+        """Its global switch is off: by its parameter, or where that was not read by its status. The
+        name of that bit is assumed, and must cost no deploy of one that says to be enabled."""
+        switch = self.switch(p.ENABLE_PARACHUTE)
         told = map(_error_name, self._told_errors())
-        return self.switch(p.ENABLE_PARACHUTE) is False or _DISABLED in told
+        return switch is False or (switch is None and _DISABLED in told)
 
     def _told_errors(self) -> list[str]:
         return self.definitions.faults(names.PARACHUTE_STATUS, self.values)

@@ -5,6 +5,7 @@ from upf_link_bench import LAYOUTS, Bench, Layout, layout_of, types_of
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ErrorFlags, ParachuteState
 
@@ -201,3 +202,8 @@ def test_a_controller_that_tells_that_it_is_disabled_never_deploys():
     assert story.link.devices.controllers[33].never_deploys
     assert story.picture().state is ParachuteState.ABNORMAL
     assert not story.status("READY").link.devices.controllers[33].never_deploys
+    # Its own parameter knows better: the name of the bit is assumed.
+    story.status("READY", error_flags=32).link.devices.controllers[33].parameters[
+        p.ENABLE_PARACHUTE
+    ] = True
+    assert not story.link.devices.controllers[33].never_deploys
