@@ -287,8 +287,8 @@ class Controller(Device):
 
     @property
     def never_deploys(self) -> bool:
-        """Its global switch is off: by its parameter, or where that was not read by its status. The
-        name of that bit is assumed, and must cost no deploy of one that says to be enabled."""
+        """Its global switch is off: by its parameter, or where that was not read by its status, in
+        which the name of the bit is assumed: it costs no deploy of one that says it is enabled."""
         switch = self.switch(p.ENABLE_PARACHUTE)
         told = map(_error_name, self._told_errors())
         return switch is False or (switch is None and _DISABLED in told)
