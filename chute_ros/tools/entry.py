@@ -60,9 +60,13 @@ def run(name: str, module: str) -> None:
 
 
 def _shut_down(error: BaseException) -> bool:
-    """A signal has shut ROS down: a script's background job has no SIGINT but rclpy's own."""
-    rclpy = sys.modules.get("rclpy.executors")
-    return rclpy is not None and isinstance(error, rclpy.ExternalShutdownException)
+    """A signal has shut ROS down: a script's background job has no SIGINT but rclpy's own, which
+    does it in a thread of its own, before ours is told. Then each call of rclpy fails."""
+    if "rclpy.executors" not in sys.modules:
+        return False
+    rclpy, binding = (sys.modules[name] for name in ("rclpy", "rclpy._rclpy_pybind11"))
+    ended = isinstance(error, binding.RCLError) and not rclpy.ok()
+    return ended or isinstance(error, sys.modules["rclpy.executors"].ExternalShutdownException)
 
 
 def _not_printed(name: str, error: NotPrintedError) -> int:

@@ -124,7 +124,7 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
     monkeypatch.setattr(campaign_command._Progress, "look", look)
     monkeypatch.setattr(flights.Tally, "__eq__", None)
     monkeypatch.setattr(
-        campaign_command, "page", lambda tally, *_: pages.append(kept(tally)) or "page"
+        campaign_command, "page", lambda tally, *_: pages.append(kept(tally)) or "# page\n\n"
     )
     with dask_bench() as another:
         another.start_worker()

@@ -242,6 +242,47 @@ def test_in_the_middle_of_what_rclpy_makes(place, number, code, told):
     assert done.stdout.count("due\n") == 2
 
 
+#: rclpy has shut itself down by a signal that Python has not been told of yet.
+SHUT_DOWN = """
+import sys
+import types
+
+import rclpy
+import rclpy.executors
+from std_srvs.srv import Trigger
+
+
+def main():
+    rclpy.init(args=[])
+    client = rclpy.create_node("shut_down").create_client(Trigger, "any")
+    {ends}
+    client.service_is_ready()
+    raise RuntimeError("a mistake")
+
+
+module = types.ModuleType("chute_ros.tools.shutting")
+module.main = main
+sys.modules[module.__name__] = module
+from chute_ros.tools.entry import run
+run("shutting", "shutting")
+"""
+
+
+@pytest.mark.parametrize(
+    ("ends", "code", "told"),
+    [
+        ("rclpy.get_default_context().shutdown()", 130, "shutting: interrupted\n"),
+        ("pass", 1, "RuntimeError: a mistake\n"),
+    ],
+)
+def test_after_rclpy_has_shut_down_by_a_signal(ends, code, told):
+    command = [sys.executable, "-c", SHUT_DOWN.format(ends=ends)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
+    )
+    assert (done.returncode, done.stderr[-len(told) :]) == (code, told)
+
+
 def test_an_error_of_another_cause_is_one():
     code = BINDING.format(number="signal.SIGCONT")
     command = [sys.executable, "-c", code]
