@@ -54,6 +54,15 @@ def _disarmed(bench: MavlinkBench) -> Trial:
     return refused(answer, "a release while no source is armed", "; nothing was released")
 
 
+def _of_another_source(bench: MavlinkBench) -> Trial:
+    yield from _ready(bench)
+    yield from bench.accepted(ARM, int(TriggerFlags.ATS), EVERY)
+    answer = yield from bench.command(_DO, _RELEASE, tries=1)
+    yield from _still_packed(bench, "only the ATS was armed")
+    yield from bench.command(ARM, 0, EVERY)
+    return refused(answer, "a command to release while only the ATS is armed")
+
+
 def _near_ground(bench: MavlinkBench) -> Trial:
     yield from _ready(bench)
     status = yield from bench.status()
@@ -117,6 +126,13 @@ CLAUSES = (
         "release-disarmed",
         "a source that is disarmed does not release",
         _disarmed,
+        _MAY,
+        Risk.FIRES,
+    ),
+    of(PARACHUTE, "Parachute Triggering Sources")(
+        "release-other-source",
+        "a command does not release where only the ATS is armed",
+        _of_another_source,
         _MAY,
         Risk.FIRES,
     ),

@@ -21,6 +21,7 @@ _REQUEST, _SET = dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_IN
 _GET = dialect.MAV_CMD_GET_MESSAGE_INTERVAL
 _ARM, _DO = dialect.MAV_CMD_SET_PARACHUTE_ARM, dialect.MAV_CMD_DO_PARACHUTE
 _ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
+_BY_COMMAND = TriggerFlags.FC | TriggerFlags.OFFBOARD
 #: Header of a MAVLink 2 frame, the parameters before the number of a COMMAND_LONG, its number.
 _NUMBER = slice(10 + 28, 10 + 30)
 #: One that is confused by a frame is deaf, or silent, for so long, s.
@@ -312,7 +313,11 @@ def _disarmed(device: BrokenParachute, params: Params) -> bool:
 
 
 def _armed(device: BrokenParachute, params: Params) -> bool:
-    return _release_wanted(device, params) and bool(device.armed)
+    return _release_wanted(device, params) and bool(device.armed & _BY_COMMAND)
+
+
+def _armed_otherwise(device: BrokenParachute, params: Params) -> bool:
+    return _release_wanted(device, params) and device.armed == TriggerFlags.ATS
 
 
 def _in_itself(_: BrokenParachute) -> None:
@@ -386,9 +391,8 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
     "automatic-release": _wrong(_DO, lambda device, params: params[0] == dialect.PARACHUTE_ENABLE),
     "wrong-action": _wrong(_DO, lambda device, params: params[0] > 2),
     "release-disarmed": _wrong(_DO, _disarmed, _releases_anyway),
+    "release-other-source": _wrong(_DO, _armed_otherwise, _releases_anyway),
     "release-near-ground": _wrong(_DO, _armed, _releases_anyway),
-    "release": _wrong(
-        _DO, lambda device, params: _release_wanted(device, params) and bool(device.armed)
-    ),
+    "release": _wrong(_DO, _armed),
     "released-stays": _forgets,
 }
