@@ -56,13 +56,10 @@ def check_links(turn: Turn) -> None:
             # What was armed before a link was silent is armed still, until its status says
             # otherwise: the heartbeat that makes the link whole may overtake it.
             last_said = turn.state.armed(turn.config) + turn.state.armed(turn.config, False)
-            _show_armed(turn, [one for one in last_said if _heard(turn, one[0])])
+            heard = [one for one in last_said if turn.state.hears(turn.config, one[0], turn.now)]
+            _show_armed(turn, heard)
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")
-
-
-def _heard(turn: Turn, link: str) -> bool:
-    return turn.state.evidence(link).is_heard(turn.config.limits(link), turn.now)
 
 
 def block_or_release(turn: Turn) -> None:

@@ -217,6 +217,10 @@ class State:
         """What is known of a link."""
         return self.heard.links.get(link, _NEVER_HEARD)
 
+    def hears(self, config: SupervisorConfig, link: str, now: float) -> bool:
+        """What this link says counts now."""
+        return self.evidence(link).is_heard(config.limits(link), now)
+
     def unmonitored(self, link: str) -> bool:
         """Its node says that of its device nothing can be known."""
         return self.evidence(link).reported is LinkState.UNMONITORED
@@ -261,7 +265,7 @@ class State:
         return frozenset(
             (link, device)
             for link, device in self.released(config) - self.flight.released_before
-            if self.evidence(link).is_heard(config.limits(link), now)
+            if self.hears(config, link, now)
             or now < self.evidence(link).released_at + config.limits(link).lost_after
         )
 

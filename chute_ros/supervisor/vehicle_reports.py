@@ -230,9 +230,7 @@ def _judged_at_rest(turn: Turn) -> dict[str, str]:
     limit, judged = config.profile.moving_speed, {}
     known = state.measured(ACCELERATION)
     force = known.usable(config.profile.limits[ACCELERATION], now)
-    known = state.measured(VERTICAL_SPEED)
-    speed = known.usable(config.profile.limits[VERTICAL_SPEED], now)
-    rate = readings.told_rate(config, state, PRESSURE_ALTITUDE, now)
+    speed, rate = _vertical(turn)
     moves = abs(speed) > limit or abs(rate) > limit
     least, most = _AT_REST
     if not (moves or math.isnan(force)):
@@ -247,11 +245,17 @@ def _judged_at_rest(turn: Turn) -> dict[str, str]:
 def _judged_aloft(turn: Turn) -> dict[str, str]:
     """What told on the ground what cannot be there, as of one that a balloon or a ship carries, is
     well again once it and another origin tell of a level flight."""
+    limit = turn.config.profile.moving_speed
+    level = all(abs(one) <= limit for one in _vertical(turn))
+    return dict.fromkeys((VERTICAL_SPEED, HEIGHT, PRESSURE_ALTITUDE), "") if level else {}
+
+
+def _vertical(turn: Turn) -> tuple[float, float]:
+    """The vertical speed as it is told and as the barometer tells it, fit or not, m/s; NaN: not
+    known."""
     known = turn.state.measured(VERTICAL_SPEED)
     speed = known.usable(turn.config.profile.limits[VERTICAL_SPEED], turn.now)
-    rate = readings.told_rate(turn.config, turn.state, PRESSURE_ALTITUDE, turn.now)
-    level = abs(speed) <= (limit := turn.config.profile.moving_speed) and abs(rate) <= limit
-    return dict.fromkeys((VERTICAL_SPEED, HEIGHT, PRESSURE_ALTITUDE), "") if level else {}
+    return speed, readings.told_rate(turn.config, turn.state, PRESSURE_ALTITUDE, turn.now)
 
 
 def _cannot_move(turn: Turn, force: float, speed: float) -> bool:

@@ -30,12 +30,20 @@ class KitRun:
     """Kit and device on one line."""
 
     def __init__(self, session: Session[Any], device: Any) -> None:
-        self.session = session
+        self.session, self.device = session, device
         self.line = VirtualLine(session, device)
 
     def to(self, until: Callable[[], bool] = lambda: False) -> Self:
         """To its end, or until this holds."""
         self.line.run(until)
+        return self
+
+    def silenced(self) -> Self:
+        """To its end, as the device falls silent once the first clause was tried."""
+        self.to(lambda: bool(self.results))
+        self.device.act("silent")
+        self.to()
+        assert self.problem.startswith("the device fell silent")
         return self
 
     @property

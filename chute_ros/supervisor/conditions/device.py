@@ -91,8 +91,7 @@ class DeviceCondition(Condition):
             f"{name} {device} is ABNORMAL ({'; '.join(status.faults) or 'no reason given'})"
             for name in names
             for device, status in state.evidence(name).devices.items()
-            if status.state is ParachuteState.ABNORMAL
-            and state.heard.links[name].is_heard(config.limits(name), now)
+            if status.state is ParachuteState.ABNORMAL and state.hears(config, name, now)
         ]
         return Finding(bool(wrong), lambda: "; ".join(wrong) or "no device is ABNORMAL")
 

@@ -40,7 +40,6 @@ class Run(KitRun):
         options: tuple[str, ...] = OPTIONS,
         session: Session[UmbilicalBench] | None = None,
     ) -> None:
-        self.device = device
         bench = UmbilicalBench(device.layout, risk, options)
         super().__init__(session or Session(bench, CLAUSES, Allowed(risk, options)), device)
 
@@ -310,12 +309,7 @@ def test_a_device_that_cannot_be_disarmed_is_named() -> None:
 
 def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed() -> None:
     """Given one that falls silent before the first such command, though it is allowed."""
-    device = sound()
-    run = Run(device)
-    run.to(lambda: bool(run.results))
-    device.act("silent")
-    run.to()
-    assert run.problem.startswith("the device fell silent")
+    run = Run(sound()).silenced()
     assert "LEFT" not in run.problem
 
 
