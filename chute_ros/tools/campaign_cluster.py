@@ -79,7 +79,8 @@ class Cluster:
         self._address = address
         try:
             # Alone a client waits for ever for what answers, but as no scheduler does.
-            asyncio.run(asyncio.wait_for(_identity(address), _PATIENCE))
+            if (kind := asyncio.run(asyncio.wait_for(_kind(address), _PATIENCE))) != "Scheduler":
+                raise OSError(f"a {kind} is there")
             self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
         except (OSError, asyncio.TimeoutError) as error:
             raise CampaignError(
@@ -156,9 +157,10 @@ class Cluster:
             pass  # of a scheduler that is gone
 
 
-async def _identity(address: str) -> None:
-    async with distributed.rpc(address, timeout=_PATIENCE) as scheduler:
-        await scheduler.identity()
+async def _kind(address: str) -> str:
+    """What Dask calls what answers there."""
+    async with distributed.rpc(address, timeout=_PATIENCE) as server:
+        return str((await server.identity())["type"])
 
 
 def _told(error: BaseException) -> str:

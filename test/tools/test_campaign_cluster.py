@@ -219,10 +219,10 @@ def test_a_scheduler_without_workers_is_told_with_the_remedy(nothing_flies, monk
 
 @contextlib.contextmanager
 def nobody():
-    """A port at which nobody listens."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    yield port
+    """A port at which nobody listens; held, so that no other test's server comes to it."""
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        yield held.getsockname()[1]
 
 
 @contextlib.contextmanager
@@ -232,7 +232,14 @@ def silent():
         yield server.getsockname()[1]
 
 
-@pytest.mark.parametrize("port", [nobody, silent])
+@contextlib.contextmanager
+def worker():
+    """The port of a worker, which answers as well."""
+    with dask_bench() as bench:
+        yield bench.start_worker().rpartition(":")[2]
+
+
+@pytest.mark.parametrize("port", [nobody, silent, worker])
 def test_where_no_scheduler_is_it_is_told_with_the_remedy(
     nothing_flies, port, monkeypatch, capsys
 ):

@@ -16,22 +16,18 @@ from conformance_processes import COMMAND, started
 from junitparser import JUnitXml
 from mcap.reader import make_reader
 
+from chute_ros.tools.isolation import free_udp_ports
+
 SIMULATOR = [sys.executable, "-u", "-m"]
 SIMULATOR += ["chute_ros.links.mavlink.simulator.sim_mavlink_parachute"]
 QUICK = ["--only", "request-status", "unknown-command"]
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
 
 
 class Bench:
     """A device on loopback. connection: of the kit."""
 
     def __init__(self, *options: str) -> None:
-        ours, theirs = free_port(), free_port()
+        ours, theirs = free_udp_ports(2)
         self.connection = f"udppair:127.0.0.1:{ours}:127.0.0.1:{theirs}"
         self._device = [
             *SIMULATOR,

@@ -115,13 +115,6 @@ def udp() -> socket.socket:
     return end
 
 
-def free_port(kind: socket.SocketKind) -> int:
-    """A port that nobody uses at this moment."""
-    with socket.socket(socket.AF_INET, kind) as end:
-        end.bind((LOCAL, 0))
-        return int(end.getsockname()[1])
-
-
 def point(link: Path, target: str) -> None:
     """Have the symbolic link point to target, as udev does for a device that comes back."""
     fresh = link.with_suffix(".new")

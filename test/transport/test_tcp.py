@@ -1,15 +1,24 @@
 """TCP as a wire, over real sockets on loopback."""
 
+import contextlib
 import socket
 
 import pytest
-from loop_bench import LOCAL, free_port, running
+from loop_bench import LOCAL, running
 
 
 def listen(port=0):
     server = socket.create_server((LOCAL, port))
     server.settimeout(20.0)
     return server
+
+
+@contextlib.contextmanager
+def not_listened():
+    """A port at which nobody listens; held, so that no other process comes to it."""
+    with socket.socket() as held:
+        held.bind((LOCAL, 0))
+        yield held.getsockname()[1]
 
 
 def connect(port):
@@ -64,8 +73,7 @@ def test_a_server_that_only_stops_speaking_is_left(await_until):
 
 
 def test_no_server_is_said_and_does_not_stop_the_loop(await_until):
-    port = free_port(socket.SOCK_STREAM)
-    with running(f"tcp:{LOCAL}:{port}") as node:
+    with not_listened() as port, running(f"tcp:{LOCAL}:{port}") as node:
         assert f"tcp:{LOCAL}:{port} cannot be opened" in node.changes[0].text
         assert "refused" in node.changes[0].text
         done = []

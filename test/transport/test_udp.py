@@ -4,7 +4,7 @@ import contextlib
 import socket
 
 import pytest
-from loop_bench import LOCAL, Running, descriptors, free_port, running, udp
+from loop_bench import LOCAL, Running, descriptors, running, udp
 
 from chute_ros.transport.address import Address
 from chute_ros.transport.loop import WireLoop
@@ -140,7 +140,8 @@ def test_only_those_are_answered_whose_frames_the_protocol_takes(await_until):
 
 
 def test_nobody_is_there_to_hear_and_later_somebody_is(await_until):
-    port = free_port(socket.SOCK_DGRAM)
+    with udp() as gone:
+        port = gone.getsockname()[1]
     with running(f"udpout:{LOCAL}:{port}") as node:
         for number in range(5):
             node.send(b"into the void %d" % number)
