@@ -48,6 +48,8 @@ _TELL_EVERY = 5.0  # s
 _KEEP_EVERY = 60.0  # s
 #: So many of those that must not be are told; all are saved.
 _MOST_TOLD = 20
+#: Beside the page: delays, heights.
+_PICTURES = (".svg", ".heights.svg")
 _BROKEN = "the flights until then are reported, and --resume FILE continues from them"
 
 
@@ -93,7 +95,9 @@ def main() -> None:
         help="fly on the workers of this Dask cluster",
     )
     options.add_argument(
-        "--page", type=page_path, help="write the results to this page, with pictures beside it"
+        "--page",
+        type=page_path(*_PICTURES),
+        help="write the results to this page, with pictures beside it",
     )
     options.add_argument(
         "--failures",
@@ -381,15 +385,21 @@ def writable(text: str) -> Path:
     return path
 
 
-def page_path(text: str) -> Path:
-    """The same, of a page with its picture beside it, which go over nothing else."""
-    path = writable(text)
-    try:
-        require_output(path, MARKDOWN)
-        require_output(path.with_suffix(".svg"), SVG)
-    except ChuteError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-    return path
+def page_path(*pictures: str) -> Callable[[str], Path]:
+    """The same, of a page with pictures beside it, each with such a suffix, which go over nothing
+    else."""
+
+    def path_of(text: str) -> Path:
+        path = Path(text)
+        try:
+            require_output(path, MARKDOWN)
+            for suffix in pictures:
+                require_output(path.with_suffix(suffix), SVG)
+        except ChuteError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return path
+
+    return path_of
 
 
 def scenario(text: str) -> int | Scenario:
@@ -414,7 +424,7 @@ def tapes(text: str) -> Path:
 
 
 def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEach | None) -> None:
-    drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
+    drawn = dict(zip(("delays", "heights"), map(path.with_suffix, _PICTURES), strict=True))
     write_page(drawn["delays"], picture(tally.lines, "release_delay"), SVG)
     write_page(drawn["heights"], picture(tally.lines, "height_lost"), SVG)
     names = {what: one.name for what, one in drawn.items()}

@@ -11,12 +11,12 @@ from pathlib import Path
 from chute_ros.campaign.confidence import flights_needed
 from chute_ros.campaign.description import read_description
 from chute_ros.campaign.heights import WANTED, Campaign, find, own_shipped
-from chute_ros.errors import ProfileError
+from chute_ros.errors import ChuteError, ProfileError
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.tools.heights_page import Result, heights, page, times
 from chute_ros.tools.heights_picture import picture
 from chute_ros.tools.machine import machine
-from chute_ros.tools.page_file import MARKDOWN, SVG, write_page
+from chute_ros.tools.page_file import MARKDOWN, SVG, require_output, write_page
 from chute_ros.tools.progress import Progress
 
 #: Of each failure, where none are asked for: enough for the statement.
@@ -49,7 +49,7 @@ def refuse_unfit(options: ArgumentParser, chosen: Namespace) -> None:
 
 def fly_described(options: ArgumentParser, chosen: Namespace, profiles: Path) -> None:
     """Fly all vehicles, print what was found, and write the page. Exit code 2: a description is
-    not right."""
+    not right, or something else stands where the page or a picture goes."""
     begun, flights = time.monotonic(), chosen.flights or FLIGHTS
     campaigns, read = [], []
     try:
@@ -59,17 +59,29 @@ def fly_described(options: ArgumentParser, chosen: Namespace, profiles: Path) ->
             read.append(_profile(campaigns[-1]))
     except ProfileError as error:
         options.error(f"argument --vehicle: {error}")
+    try:
+        if chosen.page:
+            require_output(chosen.page, MARKDOWN, chosen.vehicle)
+            for file in chosen.vehicle:
+                require_output(_picture(chosen.page, file), SVG)
+    except ChuteError as error:
+        options.error(f"argument --page: {error}")
     results = []
     for file, campaign, profile in zip(chosen.vehicle, campaigns, read, strict=True):
         progress = Progress(f"{campaign.vehicle.name}: flights", campaign.number)
         every = find(campaign, chosen.jobs, progress.at)
-        drawn = f"{chosen.page.stem}.{file.stem}.svg" if chosen.page else ""
+        drawn = _picture(chosen.page, file).name if chosen.page else ""
         results.append(Result(file, campaign, every, profile, drawn))
         print(f"{campaign.vehicle.name}, {flights} flights of each failure:\n")
         print(f"{heights(every)}\n\n{times(results[-1].plain)}\n", flush=True)
     if chosen.page:
         took = f"{time.monotonic() - begun:.0f} s, {chosen.jobs} at a time on {machine()}"
         _write(results, chosen.page, _command(chosen, flights), took)
+
+
+def _picture(page: Path, vehicle: Path) -> Path:
+    """Beside the page, of the vehicle of this file."""
+    return page.with_name(f"{page.stem}.{vehicle.stem}.svg")
 
 
 def _profile(campaign: Campaign) -> Profile:

@@ -28,6 +28,8 @@ from chute_ros.tools.machine import machine
 from chute_ros.tools.page_file import MARKDOWN, SVG, write_page
 
 _TELL_EVERY = 5.0  # s
+#: Beside the page: curves, delays.
+_PICTURES = (".svg", ".delays.svg")
 
 
 def main() -> None:
@@ -39,7 +41,9 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
     options.add_argument(
-        "--page", type=page_path, help="write the results to this page, with pictures beside it"
+        "--page",
+        type=page_path(*_PICTURES),
+        help="write the results to this page, with pictures beside it",
     )
     chosen = options.parse_args()
     begun, lines, seeds, ended = time.monotonic(), [], 0, ""
@@ -103,10 +107,7 @@ def _tell(lines: list[Compared]) -> None:
 
 
 def _write(path: Path, run: Run, lines: list[Compared]) -> None:
-    drawn = {
-        path.with_suffix(".svg"): curves(lines),
-        path.with_suffix(".delays.svg"): delays(lines),
-    }
-    for one, text in drawn.items():
-        write_page(one, text, SVG)
+    drawn = [path.with_suffix(suffix) for suffix in _PICTURES]
+    for one, draw in zip(drawn, (curves, delays), strict=True):
+        write_page(one, draw(lines), SVG)
     write_page(path, page(lines, run, [one.name for one in drawn]), MARKDOWN)

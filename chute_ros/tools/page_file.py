@@ -1,4 +1,4 @@
-"""Writes the files that tools make for people: never over what was read, nor over others."""
+"""Writes the files that tools make: never over what was read, nor over others."""
 
 from __future__ import annotations
 
@@ -29,12 +29,19 @@ SVG = Kind("SVG picture", re.compile(rb"(<\?xml [^>]*>\s*)?<svg "))
 #: A title alone: parameter files begin with a comment of several lines.
 MARKDOWN = Kind("Markdown page", re.compile(rb"# [^\n]+\n\n"))
 JUNIT = Kind("JUnit report", re.compile(rb"(<\?xml [^>]*>\s*)?<testsuite"))
+#: What the kit's recordings say of who wrote them; black boxes are MCAP as well.
+KIT_LIBRARY = "chute_ros conformance"
+KIT_MCAP = Kind(
+    "MCAP recording of conformance",
+    re.compile(rb"\x89MCAP0\r\n\x01.{12}.{4}" + KIT_LIBRARY.encode(), re.DOTALL),
+)
 
 
 def require_output(path: Path, kind: Kind, inputs: Iterable[Path] = ()) -> None:
     """ChuteError, in one line, where write_page would raise it now."""
     try:
-        if _existing(path, kind, inputs) is None or path.is_file():
+        existing = _existing(path, kind, inputs)
+        if existing is None or stat.S_ISREG(existing.st_mode):
             with contextlib.closing(_Beside(path)):
                 pass
     except OSError as error:
@@ -42,9 +49,13 @@ def require_output(path: Path, kind: Kind, inputs: Iterable[Path] = ()) -> None:
 
 
 def write_page(path: Path, text: str, kind: Kind, inputs: Iterable[Path] = ()) -> None:
-    """Write text to path: whole, or what was there stays. ChuteError, in one line: it cannot be
+    """write_output of a text, in UTF-8."""
+    write_output(path, text.encode("utf-8"), kind, inputs)
+
+
+def write_output(path: Path, data: bytes, kind: Kind, inputs: Iterable[Path] = ()) -> None:
+    """Write data to path: whole, or what was there stays. ChuteError, in one line: it cannot be
     written, is one of inputs, or is there and is no earlier output of this kind."""
-    data = text.encode("utf-8")
     assert kind.begins.match(data), f"no {kind.name}"  # the next one could not go over it
     try:
         existing = _existing(path, kind, inputs)
@@ -64,6 +75,8 @@ def _existing(path: Path, kind: Kind, inputs: Iterable[Path]) -> os.stat_result 
         about = path.stat()
     except FileNotFoundError:
         return None
+    if stat.S_ISDIR(about.st_mode):
+        raise ChuteError(f"{path} is a folder: name a file in it")
     if not stat.S_ISREG(about.st_mode):
         return about
     for one in inputs:
@@ -82,8 +95,6 @@ class _Beside:
 
     def __init__(self, path: Path) -> None:
         self._path = Path(os.path.realpath(path))
-        if self._path.is_dir():
-            raise IsADirectoryError(f"{path} is a folder")
         self._new = self._path.with_name(f"{self._path.name}.{os.getpid()}.new")
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         self._descriptor = os.open(self._new, flags, 0o666)

@@ -49,8 +49,8 @@ run = partial(call, campaign)
         (["--plan", "0"], "argument --plan: 0: need a whole number, 1 or more"),
         (["--core-hour-price", "-1"], "argument --core-hour-price: -1: need a number, 0 or more"),
         (["--core-hour-price", "nan"], "--core-hour-price: nan: need a number, 0 or more"),
-        (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
-        (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
+        (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: No such file or directory"),
+        (["--page", "/tmp"], "argument --page: /tmp is a folder: name a file in it"),
         (["--page", __file__], "test_campaign_command.py exists and is no Markdown page: remove"),
         (["--tapes", "/nowhere"], "argument --tapes: /nowhere: No such file or directory"),
         (["--tapes", __file__], "test_campaign_command.py: no file of tapes: it does not begin"),
@@ -65,6 +65,13 @@ run = partial(call, campaign)
 )
 def test_a_mistake_is_said_at_once(arguments, words, monkeypatch, capsys):
     assert_refused(campaign, monkeypatch, capsys, arguments, words)
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".heights.svg"])
+def test_no_picture_goes_over_another_file(suffix, tmp_path, monkeypatch, capsys):
+    (tmp_path / f"a{suffix}").write_text("mine")
+    words = f"argument --page: {tmp_path}/a{suffix} exists and is no SVG picture: remove it, or"
+    assert_refused(campaign, monkeypatch, capsys, ["--page", str(tmp_path / "a.md")], words)
 
 
 def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):

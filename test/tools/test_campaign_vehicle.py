@@ -88,6 +88,18 @@ def test_a_profile_of_its_own_that_is_wrong_is_refused_with_its_line(
     assert_refused(campaign, monkeypatch, capsys, ["--vehicle", str(file)], words)
 
 
+def test_its_page_and_pictures_go_over_nothing_else(tmp_path, monkeypatch, capsys):
+    drone, page = tmp_path / "drone.yaml", tmp_path / "a.md"
+    drone.write_text(Path(DRONE).read_text())
+    (tmp_path / "a.drone.svg").write_text("mine")
+    given = ["--vehicle", str(drone), "--page"]
+    words = f"argument --page: {tmp_path}/a.drone.svg exists and is no SVG picture: remove it, or"
+    assert_refused(campaign, monkeypatch, capsys, [*given, str(page)], words)
+    drone.write_text("# A vehicle\n\n" + drone.read_text())
+    words = f"argument --page: {drone} is read here: nothing is written over it: name another"
+    assert_refused(campaign, monkeypatch, capsys, [*given, str(drone)], words)
+
+
 def test_it_prints_its_tables_and_writes_its_page_and_its_picture(monkeypatch, tmp_path, capsys):
     page = tmp_path / "mine.md"
     options = ("--flights", "1", "--seed", "5", "--jobs", "1", "--page", str(page))

@@ -33,12 +33,19 @@ run = partial(call, compare)
         (["--flights", "1e3"], "argument --flights: 1e3: need a whole number, 1 or more"),
         (["--seed", "first"], "argument --seed: invalid int value: 'first'"),
         (["--jobs", "-1"], "argument --jobs: -1: need a whole number, 1 or more"),
-        (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
+        (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: No such file or directory"),
         (["--peers", "PX4"], "unrecognized arguments: --peers PX4"),
     ],
 )
 def test_a_mistake_is_said_at_once(arguments, words, monkeypatch, capsys) -> None:
     assert_refused(compare, monkeypatch, capsys, arguments, words)
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".delays.svg"])
+def test_no_picture_goes_over_another_file(suffix, tmp_path, monkeypatch, capsys) -> None:
+    (tmp_path / f"a{suffix}").write_text("mine")
+    words = f"argument --page: {tmp_path}/a{suffix} exists and is no SVG picture: remove it, or"
+    assert_refused(compare, monkeypatch, capsys, ["--page", str(tmp_path / "a.md")], words)
 
 
 def test_two_flights_make_a_page_with_pictures(monkeypatch, tmp_path, capsys) -> None:

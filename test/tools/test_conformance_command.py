@@ -15,6 +15,7 @@ import pytest
 from conformance_processes import COMMAND, started
 from junitparser import JUnitXml
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from chute_ros.tools.isolation import free_udp_ports
 
@@ -68,6 +69,25 @@ def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
     with traffic.open("rb") as file:
         packets = [json.loads(one.data) for *_, one in make_reader(file).iter_messages()]
     assert {"HEARTBEAT", "COMMAND_LONG", "COMMAND_ACK"} <= {one["name"] for one in packets}
+
+
+def test_a_recording_goes_over_an_earlier_one_and_over_no_black_box(tmp_path: Path) -> None:
+    file = tmp_path / "a.mcap"
+    for _ in range(2):
+        code, _, errors = Bench().run("--only", "request-status", "--mcap", str(file))
+        assert (code, errors) == (0, "")
+    with file.open("wb") as box:
+        writer = Writer(box)
+        writer.start(profile="ros2", library="chute_ros")
+        writer.finish()  # type: ignore[no-untyped-call]
+    before = file.read_bytes()
+    code, out, errors = Bench().run("--only", "request-status", "--mcap", str(file))
+    assert (code, out) == (2, "")
+    assert errors == (
+        f"conformance: {file} exists and is no MCAP recording of conformance: remove it, or name "
+        "another\n"
+    )
+    assert file.read_bytes() == before
 
 
 def test_a_clause_that_fails_ends_with_1(tmp_path: Path) -> None:

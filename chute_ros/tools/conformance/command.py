@@ -34,8 +34,15 @@ from chute_ros.ros.own_version import own_version
 from chute_ros.sim.command_line import real
 from chute_ros.tools.conformance.page import page
 from chute_ros.tools.conformance.report import Report
-from chute_ros.tools.conformance.traffic import write_mcap
-from chute_ros.tools.page_file import HTML, JUNIT, require_output, write_page
+from chute_ros.tools.conformance.traffic import recording
+from chute_ros.tools.page_file import (
+    HTML,
+    JUNIT,
+    KIT_MCAP,
+    require_output,
+    write_output,
+    write_page,
+)
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
@@ -125,11 +132,10 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
     bench, wire = kit.bench(chosen, risk), kit.wire(chosen)
     given = {f"--{name.replace('_', '-')}" for name, value in vars(chosen).items() if value}
     # A long run must not end with a report that cannot be written.
-    if chosen.html:
-        require_output(chosen.html, HTML)
-    _writable(chosen.mcap)
+    for path, kind in ((chosen.html, HTML), (chosen.junit, JUNIT), (chosen.mcap, KIT_MCAP)):
+        if path is not None:
+            require_output(path, kind)
     if chosen.junit:
-        require_output(chosen.junit, JUNIT)
         _junit()
     if risk is not Risk.NONE:
         _ask(kit, risk)
@@ -160,14 +166,6 @@ def _clauses(kit: Kit, only: Sequence[str]) -> list[Clause[Any]]:
     if unknown := [one for one in only if one not in names]:
         raise ChuteError(f"--only {' '.join(unknown)}: no such clause; --list has all")
     return [one for one in kit.clauses if not only or one.name in only]
-
-
-def _writable(file: Path | None) -> None:
-    if file is not None:
-        try:
-            file.open("ab").close()
-        except OSError as error:
-            raise ChuteError(f"{file}: {error.strerror}") from None
 
 
 def _junit() -> Callable[[Report], str]:
@@ -274,7 +272,7 @@ def _write(chosen: argparse.Namespace, report: Report) -> None:
     writers: list[tuple[Path | None, Callable[[Path], object]]] = [
         (chosen.html, lambda path: write_page(path, page(report), HTML)),
         (chosen.junit, lambda path: write_page(path, _junit()(report), JUNIT)),
-        (chosen.mcap, lambda path: write_mcap(report, path)),
+        (chosen.mcap, lambda path: write_output(path, recording(report), KIT_MCAP)),
     ]
     for path, write in writers:
         if path is not None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
-from pathlib import Path
 
 from mcap.writer import Writer
 
 from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.page_file import KIT_LIBRARY
 
 _NANOSECONDS = 1e9
 #: The content of each message, for Foxglove and the like.
@@ -23,25 +24,23 @@ _SCHEMA = {
 }
 
 
-def write_mcap(report: Report, path: Path) -> None:
-    """All traffic, a message a packet, and the report's head as metadata. OSError as the disk
-    does."""
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="", library="chute_ros")
-        schema = writer.register_schema(
-            "chute_ros.Packet", "jsonschema", json.dumps(_SCHEMA).encode()
-        )
-        channel = writer.register_channel("traffic", "json", schema)
-        for number, one in enumerate(report.traffic):
-            at = report.began + int(one.at * _NANOSECONDS)
-            told = {
-                "sent": one.sent,
-                "sender": one.sender,
-                "name": one.name,
-                "text": one.text,
-                "hex": one.raw.hex(),
-            }
-            writer.add_message(channel, at, json.dumps(told).encode(), at, number)
-        writer.add_metadata("chute_ros.conformance", {**report.about, "device": report.device})
-        writer.finish()  # type: ignore[no-untyped-call]
+def recording(report: Report) -> bytes:
+    """All traffic, a message a packet, and the report's head as metadata."""
+    file = io.BytesIO()
+    writer = Writer(file)
+    writer.start(profile="", library=KIT_LIBRARY)
+    schema = writer.register_schema("chute_ros.Packet", "jsonschema", json.dumps(_SCHEMA).encode())
+    channel = writer.register_channel("traffic", "json", schema)
+    for number, one in enumerate(report.traffic):
+        at = report.began + int(one.at * _NANOSECONDS)
+        told = {
+            "sent": one.sent,
+            "sender": one.sender,
+            "name": one.name,
+            "text": one.text,
+            "hex": one.raw.hex(),
+        }
+        writer.add_message(channel, at, json.dumps(told).encode(), at, number)
+    writer.add_metadata("chute_ros.conformance", {**report.about, "device": report.device})
+    writer.finish()  # type: ignore[no-untyped-call]
+    return file.getvalue()
