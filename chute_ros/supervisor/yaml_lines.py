@@ -134,7 +134,10 @@ def where_of(node: yaml.Node | None) -> Where:
     value = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
     if isinstance(node, yaml.ScalarNode):
         try:
-            value = yaml.safe_load(node.value) if node.style is None else node.value
+            if node.style is None:
+                value = yaml.constructor.SafeConstructor().construct_object(node)
+            else:
+                value = node.value
         except (yaml.YAMLError, ValueError):  # as of 2024-13-45, a date that is none
             value = node.value
         if isinstance(value, int) and abs(value) > sys.float_info.max:
