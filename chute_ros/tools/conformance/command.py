@@ -4,7 +4,8 @@ conformance DEVICE [--connection ...] [--arm] [--fire] [--html FILE] [--junit FI
 
 Nothing is armed without --arm, and nothing is fired without --fire; each is asked for again. Exit
 code 0: no clause failed; 1: one did; 2: a mistake in the command line; 3: the run is not whole (no
-device, aborted, or the device could not be left disarmed).
+device, aborted, a device that fell silent or could not be left disarmed); 74: standard output
+cannot be written; 141: nobody reads on.
 """
 
 from __future__ import annotations
