@@ -23,7 +23,7 @@ def simulator(path: str) -> str:
 setup(
     name=NAME,
     version="0.1.0",
-    description="Supervises and fires a drone's parachute over MAVLink, DroneCAN, serial or a relay",
+    description="Supervises and fires a drone's parachute: MAVLink, DroneCAN, serial, relay",
     maintainer="chute_ros maintainers",
     maintainer_email="maintainers@chute-ros.org",
     license="Apache-2.0",
