@@ -101,7 +101,7 @@ def _options() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="PART",
-        help=f"only faults whose name contains it: {', '.join(KINDS)}",
+        help=f"only faults whose name contains it: {', '.join(KINDS)}".replace("%", "%%"),
     )
     options.add_argument("--only", type=int, metavar="LOOP", help="repeat this loop alone")
     options.add_argument("--page", type=Path, help=f"write the results there ({PAGE.name})")
