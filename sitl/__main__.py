@@ -167,7 +167,7 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument(
         "--page",
         action="store_true",
-        help=f"write docs/{PAGE.name}, without AUTOPILOT of --results",
+        help=f"write docs/evidence/{PAGE.name}, without AUTOPILOT of --results",
     )
     options.add_argument("--results", type=Path, metavar="FILE",
                          help="add the runs to this file; the page has all of them")  # fmt: skip

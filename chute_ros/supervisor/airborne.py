@@ -26,7 +26,7 @@ def check_vehicle(turn: Turn) -> None:
         return  # it says so because it was ordered to take off, and is kept down
     if in_air and listed(stage, Event.TAKEN_OFF) and _may_take_off(turn):
         if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
-            turn.alarm(f"in the air although {stage.name}")
+            turn.alarm(f"took off although {stage.name}")
         turn.move(Event.TAKEN_OFF)
         _took_off(turn, anew=stage is not Stage.LANDED, armed=stage is Stage.ARMED)
     elif in_air and _falls_since_kill(turn):

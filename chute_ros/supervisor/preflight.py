@@ -66,13 +66,18 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
 
 
 def _faults(evidence: LinkEvidence) -> str:
-    devices = sorted(evidence.devices.items())
-    faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
+    # The node repeats a fault with its age of now, and may not name the device; of a device that
+    # is silent the status is old.
+    told = {kind(reason): reason for reason in evidence.reasons}
+    faults, known = [], set()
+    for name, status in sorted(evidence.devices.items()):
+        for fault in status.faults:
+            named = f"{name} {fault}"
+            now = f"{name} {told.get(kind(fault), fault)}"
+            faults.append(told.get(kind(named), now))
+            known |= {kind(named), kind(fault)}
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
-    # The same fault, told a moment later, has another age; and its node may not name the device.
-    unnamed = [fault for _, status in devices for fault in status.faults]
-    known = {kind(fault) for fault in (*faults, *unnamed)}
-    faults += [reason for reason in evidence.reasons if kind(reason) not in known]
+    faults += [reason for of, reason in told.items() if of not in known]
     return f" ({'; '.join(faults)})" if faults else ""
 
 

@@ -123,7 +123,7 @@ def test_after_a_kill_on_the_ground_flight_is_blocked_and_one_that_flies_is_watc
     assert story.newest(Action.FLIGHT_BLOCK).reasons[-1].startswith("the vehicle is KILLING")
     story.fly(10.0)
     assert story.state.stage is Stage.IN_FLIGHT
-    assert "in the air although KILLING" in story.alarms()
+    assert "took off although KILLING" in story.alarms()
     story.fall(12.0, tilt=90.0)
     assert story.fired() == ["KILL", "KILL", "DEPLOY"]
 

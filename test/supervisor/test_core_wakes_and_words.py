@@ -254,7 +254,7 @@ def test_taking_off_before_it_may_is_an_alarm_in_these_words(blocked: bool) -> N
     assert before == ("BLOCKED" if blocked else "STARTUP")
     t = story.t + 1.0
     story.at(t, story.heartbeat(healthy=False), i.VehicleReport(FLYING))
-    assert story.alarms() == [f"in the air although {before}"]
+    assert story.alarms() == [f"took off although {before}"]
     # The device node undoes arming on the ground while blocked; one wrong landed state in the air
     # must not make it stop the motors.
     assert story.decisions()[-1].action is RELEASE
@@ -530,7 +530,7 @@ def test_one_that_was_killed_on_the_ground_and_arms_again_is_followed_into_the_a
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
     story.at(2.0, i.VehicleReport(FLYING))
     assert story.state.stage is Stage.IN_FLIGHT
-    assert story.alarms() == ["in the air although KILLING"]
+    assert story.alarms() == ["took off although KILLING"]
     assert not story.state.killing.killed_in_flight
 
 

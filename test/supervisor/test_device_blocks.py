@@ -172,7 +172,7 @@ def test_taking_off_although_a_device_asks_is_an_alarm_and_followed_as_a_flight(
     story.at(0.1, ask())
     story.at(0.2, i.VehicleReport(FLYING))
     assert story.state.stage is Stage.IN_FLIGHT
-    assert "in the air although BLOCKED" in story.alarms()[0]
+    assert "took off although BLOCKED" in story.alarms()[0]
     assert story.decisions()[-1].action is RELEASE
     assert "upf_can 33" in story.state.device_blocks
 

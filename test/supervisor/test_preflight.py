@@ -517,7 +517,7 @@ def test_a_pack_may_be_allowed_a_single_day() -> None:
     )
 
 
-def test_a_fault_that_its_node_repeats_with_another_age_is_one() -> None:
+def test_a_fault_that_its_node_repeats_is_one_with_its_age_of_now() -> None:
     story = Story().ready()
     lost = ("heartbeat LOST: 7.6 s old",)
     beat = story.heartbeat(healthy=False, state=LinkState.LOST)
@@ -525,5 +525,8 @@ def test_a_fault_that_its_node_repeats_with_another_age_is_one() -> None:
     story.at(0.1, parachute(faults=lost, alive=False), replace(beat, reasons=late))
     (reason,) = block_reasons(story.config, story.state, START + 0.1)
     assert reason == (
-        f"{LINK}: its device is LOST (1/161 heartbeat LOST: 7.6 s old; no autopilot)"
+        f"{LINK}: its device is LOST (1/161 heartbeat LOST: 8.1 s old; no autopilot)"
     )
+    story.at(0.2, replace(beat, reasons=("heartbeat LOST: 8.2 s old",)))
+    (reason,) = block_reasons(story.config, story.state, START + 0.2)
+    assert reason == f"{LINK}: its device is LOST (1/161 heartbeat LOST: 8.2 s old)"
