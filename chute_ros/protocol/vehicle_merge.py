@@ -201,6 +201,7 @@ class VehicleMerge:
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,
+            height_holds=self._vehicle.height_holds,
             faults=self._faults(now),
             **fields,
         )

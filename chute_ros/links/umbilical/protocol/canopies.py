@@ -25,6 +25,8 @@ class Canopies:
         self.surely_out: set[str] = set()
         #: The command left.
         self.fired: set[str] = set()
+        #: Since when any of these was so, monotonic s.
+        self.since: dict[str, float] = {}
         self._said: set[str] = set()
 
     def watch(self, before: Record | None, record: Record, mode: FlightMode | None) -> None:
@@ -40,4 +42,6 @@ class Canopies:
             # Its mode comes after the drogue's.
             self.came_out.add("drogue")
             self._said.add("drogue")
+        for name in self.came_out:
+            self.since.setdefault(name, record.received)
         self.surely_out |= said_before & self._said

@@ -88,8 +88,8 @@ class UmbilicalConfig(Commanded, Settings):
     )
     deploy: DeployStage = parameter(
         DeployStage.DROGUE,
-        "what ~/deploy and a decided deploy fire; next: the drogue, or the main if the drogue is "
-        "out or was fired from here",
+        "what ~/deploy and a decided deploy fire; next: the drogue, or the main if the drogue has "
+        "been out, or was fired from here, for 3 s",
         name="deploy_stage",
     )
     decided_deploy_forces: bool = parameter(

@@ -21,6 +21,7 @@ from chute_ros.model import (
     ParachuteStatus,
     TriggerFlags,
     VehicleState,
+    pressure_altitude,
 )
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
@@ -36,6 +37,8 @@ _FALLS_BEHIND = 0.5
 #: So many records in a row must say that a canopy is out which nobody fired from here: text
 #: without a checksum may be damaged.
 _TO_BELIEVE = 2
+#: What came out has its time to open before the next is fired, s (`canopy does not carry`).
+_OPENS = 3.0
 #: What was fired on the ground is not packed and wired anew in less, s.
 _PACKED_AFTER = 300.0
 _FIX_3D = 3
@@ -62,6 +65,12 @@ class FlightComputer:
         self.flying = False
         self._rest_altitude = NAN
         self._rest_since = NAN
+        #: Its altitude where it stands before the flight, m: it may count from the sea. NaN: it
+        #: was not heard there.
+        self._ground = NAN
+        #: As it was last heard before a restart in this flight, m: height, and the altitude of
+        #: its pressure, which does not count from anywhere else after it.
+        self._before_restart = NAN, NAN
         self._was_out = False
         self._canopies = Canopies()
         #: Records in a row that say that the parachute is out.
@@ -93,6 +102,11 @@ class FlightComputer:
             self.restarted_in_flight = self.flying
             # Its altitude may count from elsewhere now.
             self._rest_altitude = NAN
+            if self.flying and self.record is not None:
+                by_pressure = pressure_altitude(self.record.number("pressure"))
+                self._before_restart = self._height(self.record), by_pressure
+            else:
+                self._ground = NAN
         before, self.record = self.record, record
         self._cable_pulled = False
         if before is not None:
@@ -107,7 +121,9 @@ class FlightComputer:
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
         if self.mode in GROUND and not self.flying:
-            self._canopies = Canopies()
+            self._canopies, self._before_restart = Canopies(), (NAN, NAN)
+            if self._at_rest or math.isnan(self._ground):
+                self._ground = record.number("altitude")
         return self.liveness.heard(now), age
 
     def cable_pulled(self) -> None:
@@ -118,6 +134,7 @@ class FlightComputer:
         """A command that fires the drogue or the main has left."""
         if self.flying:
             self._canopies.fired.add(name)
+            self._canopies.since.setdefault(name, now)
         else:
             self._fired_on_ground[name] = now
 
@@ -215,10 +232,12 @@ class FlightComputer:
         return self.flying and self.restarted_in_flight and self.surely_out(name)
 
     def was_fired(self, name: str, now: float) -> bool:
-        """It surely came out in this flight, or was fired from here: not every firmware tells, nor
-        can one that is silent tell that it flies."""
+        """It surely came out in this flight, or was fired from here, long enough ago to be open:
+        not every firmware tells, nor can one that is silent tell that it flies."""
+        canopies = self._canopies
+        out = self.surely_out(name) or name in canopies.fired
         lately = now - self._fired_on_ground.get(name, -math.inf) < _PACKED_AFTER
-        return self.surely_out(name) or name in self._canopies.fired or lately
+        return (out and now - canopies.since[name] >= _OPENS) or lately
 
     @property
     def armed(self) -> bool:
@@ -236,13 +255,13 @@ class FlightComputer:
             armed=self.armed,
             deployed=self.deployed,
             armed_triggers=TriggerFlags.FC if self.armed else TriggerFlags(0),
-            height=self.record.number("altitude"),
+            height=self._height(self.record),
             uptime=self._clock.uptime,
             faults=tuple(self._faults(now, pause)),
         )
 
     def vehicle_state(self, now: float) -> VehicleState:
-        """The picture of the rocket at now: altitude as height, acceleration, position by fix."""
+        """The picture of the rocket at now: height, acceleration, position by fix."""
         record = self.record
         if record is None:
             return VehicleState()
@@ -251,7 +270,7 @@ class FlightComputer:
         acceleration = math.sqrt(sum(a * a for a in axes))
         has_fix = record.number("fix_type") >= _FIX_3D
         speed = -record.number("vel_d") if has_fix else NAN
-        height = record.number("altitude")
+        height = self._height(record)
         return VehicleState(
             source=DEVICE,
             link_state=self.liveness.state,
@@ -271,9 +290,18 @@ class FlightComputer:
             uptime=self._clock.uptime,
             reboot_count=self.restarts,
             rebooted_in_flight=self.restarted_in_flight,
+            height_holds=self.restarted_in_flight and not math.isnan(sum(self._before_restart)),
         )
 
     # -- inside ----------------------------------------------------------------------------------
+
+    def _height(self, record: Record) -> float:
+        """Above where it took off, m; of one that was first heard in flight its altitude. NaN: not
+        known."""
+        height, by_pressure = self._before_restart
+        if not math.isnan(height + by_pressure):
+            return height + pressure_altitude(record.number("pressure")) - by_pressure
+        return record.number("altitude") - (0.0 if math.isnan(self._ground) else self._ground)
 
     def _has_restarted(self, record: Record) -> bool:
         """In flight, when its clock does not show it: as it runs for longer than before by now.

@@ -43,16 +43,26 @@ def test_next_is_the_main_once_the_drogue_is_out_and_nothing_once_both_are():
         ({"flight_mode": DROGUE, "ssa_drogue_deployed": 1}, "<d>"),
         ({"flight_mode": DROGUE}, "<d>"),
     ):
-        bench = ready(COAST, deploy=DeployStage.NEXT).talk(**told).after(0.3)
+        bench = ready(COAST, deploy=DeployStage.NEXT).talk(**told).after(3.3)
         bench.deploy()
         assert bench.tokens == [token], told
     bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1)
     bench.talk(ssa_drogue_deployed=0).after(0.3)
     bench.deploy()
     assert bench.tokens == ["<D>"], "after one damaged record"
-    bench = ready(MAIN, deploy=DeployStage.NEXT).talk().after(0.2)
+    bench = ready(MAIN, deploy=DeployStage.NEXT).talk().after(3.2)
     assert "already; nothing was sent" in bench.end(bench.deploy()).message
     assert bench.tokens == []
+
+
+def test_a_drogue_that_came_out_a_moment_ago_has_its_time_to_open():
+    """Given a deploy that was decided with nothing out, and held back until its kill had left."""
+    bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1).after(0.6)
+    end = bench.end(bench.deploy())
+    assert (end.success, bench.after(1.0).tokens) == (True, [])
+    assert "drogue" in end.message
+    bench.after(2.0).deploy()
+    assert bench.tokens == ["<d>"]
 
 
 def test_one_damaged_record_keeps_nothing_from_being_fired():
@@ -139,7 +149,7 @@ def test_the_next_stage_is_the_same_one_while_its_order_is_under_way():
     bench.deploy()
     bench.after(0.7)
     assert set(bench.tokens) == {"<D>"}, "nothing shows yet"
-    bench.talk(ssa_drogue_deployed=1, flight_mode=DROGUE).after(0.5)
+    bench.talk(ssa_drogue_deployed=1, flight_mode=DROGUE).after(2.0)
     bench.deploy()
     assert bench.after(0.5).tokens[-1] == "<d>"
 
@@ -155,7 +165,7 @@ def test_a_deploy_that_is_tried_again_is_no_order_for_the_main():
     bench.deploy()
     assert bench.after(1.0).tokens[0] == "<d>", "another order"
     bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1)
-    bench.talk(ssa_drogue_deployed=1).after(0.3).clear()
+    bench.talk(ssa_drogue_deployed=1).after(3.3).clear()
     bench.deploy(repeated=True)
     assert bench.after(0.3).tokens == ["<d>"], "its drogue is known to be out"
 
@@ -275,7 +285,7 @@ def test_a_flag_that_a_test_on_the_ground_left_does_not_keep_a_canopy_in(stage):
 
 def test_next_is_the_main_after_a_restart_in_flight_and_where_the_drogue_is_never_told():
     bench = ready(DROGUE, deploy=DeployStage.NEXT, ssa_drogue_deployed=1, altitude=900)
-    bench.restarts(flight_mode=STARTUP, ssa_drogue_deployed=0, altitude=800).after(0.5)
+    bench.restarts(flight_mode=STARTUP, ssa_drogue_deployed=0, altitude=800).after(3.0)
     bench.deploy()
     assert bench.tokens == ["<d>"]
     bench = ready(COAST, deploy=DeployStage.NEXT, altitude=2000)

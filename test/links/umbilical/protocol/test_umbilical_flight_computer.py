@@ -3,6 +3,7 @@
 import itertools
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from umbilical_lines import BY_NAME, body, record
@@ -302,12 +303,55 @@ def test_what_is_no_number_has_no_age_and_is_a_fault_of_the_barometer():
         assert (seen.faults, seen.state) == ((f"{name} is nan",), ParachuteState.ABNORMAL)
 
 
+def test_its_height_is_above_where_it_stood_wherever_its_altitude_counts_from():
+    """The reference says "altitude (m)" and no more: on a site 1400 m up it may be that."""
+    rocket = Rocket()
+    for step in range(80):  # the weather, and a lift on the rail
+        rocket.says(step / 10, STANDBY, altitude=str(1400.0 + 0.02 * step))
+    rocket.says(8.0, ASCENT, altitude="1440.0")
+    rocket.says(8.1, ASCENT, altitude="1901.6")
+    for seen in (vehicle(rocket, 8.1), status(rocket, 8.1)):
+        assert seen.height == pytest.approx(500.0, abs=0.1)
+    assert not vehicle(rocket, 8.1).height_holds, "as it has not started anew"
+
+
+def test_one_that_is_first_heard_in_flight_tells_its_altitude():
+    assert vehicle(flown((0.0, COAST, {"altitude": "1900"})), 0.0).height == 1900.0
+
+
+@pytest.mark.parametrize("counts_from", [0.0, 1400.0, 1700.0])
+def test_a_restart_in_flight_does_not_move_its_height(counts_from):
+    """Whether its altitude counts from the sea, or from where it started anew: its pressure does
+    not."""
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, altitude="1400", pressure="85600")
+    rocket.says(1.0, ASCENT, altitude="1500", pressure="84560")
+    rocket.says(2.0, DROGUE, altitude="1700", pressure="82520", ssa_drogue_deployed="1")
+    rocket.restarts(3.0)
+    rocket.says(3.0, STARTUP, altitude=str(1680 - counts_from), pressure="82720")
+    rocket.says(3.1, STARTUP, altitude=str(1678 - counts_from), pressure="82740")
+    rocket.says(9.0, STARTUP, altitude=str(1550 - counts_from), pressure="84040")
+    seen = vehicle(rocket, 9.0)
+    assert (seen.rebooted_in_flight, seen.height_holds) == (True, True)
+    assert seen.height == pytest.approx(150.0, abs=5.0)
+    assert status(rocket, 9.0).height == seen.height
+
+
+def test_without_a_pressure_nobody_knows_its_height_after_a_restart():
+    rocket = flown((0.0, STANDBY, {"pressure": "NaN"}), (1.0, ASCENT, {"pressure": "NaN"}))
+    rocket.restarts(3.0)
+    rocket.says(3.0, STARTUP, altitude="3")
+    rocket.says(3.1, STARTUP, altitude="3")
+    seen = vehicle(rocket, 3.1)
+    assert (seen.rebooted_in_flight, seen.height_holds) == (True, False)
+
+
 def test_any_layout_serves_also_one_with_hardly_a_field():
     for layout in BY_NAME.values():
         values = layout.decode(body(layout, flight_mode="1", ssa_drogue_deployed="0"))
         computer = FlightComputer(LIMITS)
         computer.heard(Record(layout, values, 0.0), 0.0)
-        assert computer.vehicle_state(0.0).height == 12.5, layout.name
+        assert computer.record.number("altitude") == 12.5, layout.name
         assert computer.status(0.0, "").deployed, layout.name
     reference = BY_NAME["telem57_airbrake_state"]
     needed = ("flight_mode", "altitude", "sv_open", "mav_open", *FLAGS, "ms_since_boot_cfc")
@@ -315,7 +359,7 @@ def test_any_layout_serves_also_one_with_hardly_a_field():
     computer = FlightComputer(LIMITS)
     computer.heard(Record(small, small.decode("1,25,0,0,0,0,99"), 0.0), 0.0)
     seen = computer.vehicle_state(0.0)
-    assert (seen.height, seen.armed, seen.landed_state) == (25.0, Armed.ARMED, _GROUND)
+    assert (seen.height, seen.armed, seen.landed_state) == (0.0, Armed.ARMED, _GROUND)
     values = (seen.acceleration, seen.latitude, seen.vertical_speed, seen.position_age)
     assert [math.isnan(one) for one in values] == [True] * 4
 
