@@ -203,6 +203,15 @@ def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None
     assert run.problem == ""
 
 
+def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start() -> None:
+    run = Run(Risk.NONE)
+    run.controller.services[bus_requests.RESTART_NODE] = lambda _: None
+    (restart,) = (one for one in CLAUSES if one.name == "restart")
+    line = VirtualLine(Session(run.bench, [restart], Allowed()), run.device)
+    line.run()
+    assert of(line, Verdict.FAILED) == ["restart"]
+
+
 # -- what it must not do -------------------------------------------------------------------------
 
 

@@ -207,8 +207,13 @@ def _interval(
     return apply
 
 
-def _no_uptime(device: BrokenController) -> None:
-    _node_status(device, uptime_sec=7)
+def _is_slow(device: BrokenController) -> None:
+    """Its clock."""
+    interval, make = device.broadcasts[NODE_STATUS]
+    device.broadcasts[NODE_STATUS] = (
+        interval,
+        lambda: {**(told := make()), "uptime_sec": told["uptime_sec"] // 2},
+    )
 
 
 def _updates_for_ever(device: BrokenController) -> None:
@@ -280,7 +285,7 @@ def _pace(device: BrokenController, name: str) -> float:
 _CHANGES: dict[str, Callable[[BrokenController], None]] = {
     "node-status": _interval(NODE_STATUS, lambda device: _pace(device, p.NODE_STATUS_INTERVAL)),
     "node-mode": _updates_for_ever,
-    "uptime": _no_uptime,
+    "uptime": _is_slow,
     "status-interval": _interval(
         names.PARACHUTE_STATUS, lambda device: _pace(device, p.PARACHUTE_STATUS_INTERVAL)
     ),
