@@ -93,8 +93,9 @@ READS, ASKS = "nothing: it is only listened to", "nothing: it is only asked for 
 class Clause(Generic[BenchT]):
     """In the order in which a document is read. document, section: where text stands, in the words
     of the document; name: without spaces, for command lines; does: what the device may do
-    meanwhile; needs: an option without which it is not tried; restarts: the device is told to
-    start anew, which else fails the clause."""
+    meanwhile; needs: the options (a space between two) without which it is not tried; without: one
+    with which it is not; restarts: the device is told to start anew, which else fails the
+    clause."""
 
     document: str
     section: str
@@ -104,6 +105,7 @@ class Clause(Generic[BenchT]):
     does: str = ASKS
     risk: Risk = Risk.NONE
     needs: str = ""
+    without: str = ""
     restarts: bool = False
 
 

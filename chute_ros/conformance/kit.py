@@ -16,8 +16,8 @@ from chute_ros.conformance.virtual import Device, VirtualLine
 class Kit:
     """add_options: those of this device; the bench and the wire (transport/wire.py) are made of
     what was chosen. fires: what a person must have made safe before it may fire. simulated: a
-    simulated device that breaks this clause (empty: none) where this option of a clause is given,
-    and the bench that may do all."""
+    simulated device that breaks this clause (empty: none) where these options of a clause are
+    given, and the bench that may do all."""
 
     document: str
     clauses: tuple[Clause[Any], ...]
@@ -34,4 +34,6 @@ class Kit:
         time: all that the clause needs is there and allowed."""
         needs = {one.name: one.needs for one in self.clauses}.get(broken, SOAK)
         device, bench = self.simulated(broken, needs)
-        return VirtualLine(Session(bench, self.clauses, Allowed(Risk.FIRES, (needs,))), device)
+        return VirtualLine(
+            Session(bench, self.clauses, Allowed(Risk.FIRES, needs.split())), device
+        )

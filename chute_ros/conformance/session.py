@@ -191,8 +191,11 @@ class Session(Generic[BenchT]):
         """What the person has not allowed of it; empty: nothing."""
         if clause.risk > self._allowed.risk:
             return f"it takes {clause.risk.option}"
-        if clause.needs and clause.needs not in self._allowed.options:
-            return f"it takes {clause.needs}"
+        options = self._allowed.options
+        if clause.without and clause.without in options:
+            return f"it is not tried with {clause.without}"
+        if missing := [one for one in clause.needs.split() if one not in options]:
+            return f"it takes {' '.join(missing)}"
         return ""
 
     def _tried(

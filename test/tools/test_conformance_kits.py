@@ -21,9 +21,9 @@ ALONE = [(device, clause) for device, kit in KITS.items() for clause in kit.clau
 def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     device: str, clause: Clause[object]
 ) -> None:
-    """Given --only and the option that the clause needs."""
+    """Given --only and the options that the clause needs."""
     sound, bench = KITS[device].simulated("", clause.needs or SOAK)
-    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, (clause.needs,))), sound)
+    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, clause.needs.split())), sound)
     line.run()
     (result,) = (one for one in line.events if isinstance(one, Result))
     assert result.verdict in (Verdict.PASSED, Verdict.NOT_TRIED), result.why

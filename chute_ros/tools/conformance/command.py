@@ -123,7 +123,7 @@ def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.A
 
 def _list(kit: Kit) -> None:
     for one in kit.clauses:
-        takes = one.needs or one.risk.option
+        takes = " ".join(filter(None, (one.needs, one.risk.option)))
         print(f"{one.name:20s} {one.text}" + (f" ({takes})" if takes else ""))
 
 
