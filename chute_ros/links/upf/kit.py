@@ -1,4 +1,4 @@
-"""The conformance kit of a UPF controller: what the command takes."""
+"""The conformance kit of a UPF controller and of a trigger: what the command takes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,16 @@ from argparse import ArgumentParser, Namespace
 from chute_ros.conformance.clause import Risk
 from chute_ros.conformance.kit import Kit
 from chute_ros.links.upf.conformance import CLAUSES
-from chute_ros.links.upf.conformance.bench import DNA, VEHICLE, UpfBench
+from chute_ros.links.upf.conformance.bench import (
+    A_CONTROLLER,
+    A_TRIGGER,
+    DNA,
+    TRIGGER,
+    VEHICLE,
+    UpfBench,
+)
 from chute_ros.links.upf.conformance.standard import DOCUMENT
+from chute_ros.links.upf.conformance.trigger import BROADCAST
 from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.broken import simulated_controller, simulated_trigger
@@ -31,7 +39,15 @@ def _add_options(options: ArgumentParser) -> None:
         type=_NODE_ID,
         default=0,
         metavar="ID",
-        help="node id of the controller (default: whoever tells the state of a parachute)",
+        help="node id of what is tried (default: whoever tells the state of such a device)",
+    )
+    options.add_argument(
+        TRIGGER, action="store_true", help="try a trigger, in place of a controller"
+    )
+    options.add_argument(
+        BROADCAST,
+        action="store_true",
+        help="fire the trigger by the broadcast TriggerLaunch, in place of TriggerService",
     )
     options.add_argument(
         "--vehicle-node",
@@ -58,7 +74,8 @@ def _add_options(options: ArgumentParser) -> None:
 def _bench(chosen: Namespace, risk: Risk) -> UpfBench:
     definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
     soak = chosen.soak or 0.0
-    return UpfBench(definitions, risk, chosen.node, chosen.vehicle_node, soak, chosen.dna)
+    device = A_TRIGGER if chosen.trigger else A_CONTROLLER
+    return UpfBench(definitions, risk, chosen.node, chosen.vehicle_node, soak, chosen.dna, device)
 
 
 def _wire(chosen: Namespace) -> Wire:
@@ -66,13 +83,14 @@ def _wire(chosen: Namespace) -> Wire:
 
 
 def _simulated(broken: str, needs: str) -> tuple[UpfBus, UpfBench]:
-    """With a trigger, at rest on a bench."""
+    """A trigger alone, or with a controller that is tried, at rest on a bench."""
     definitions = Definitions(load_data_types("", ""))
     controller = simulated_controller(definitions, ControllerSettings(), broken)
-    bus = UpfBus(
-        [controller, simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)]
-    )
-    return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK, dna=needs == DNA)
+    trigger = simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)
+    alone = TRIGGER in needs
+    bus = UpfBus([trigger] if alone else [controller, trigger])
+    device = A_TRIGGER if alone else A_CONTROLLER
+    return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK, dna=DNA in needs, device=device)
 
 
 KIT = Kit(
@@ -83,6 +101,7 @@ KIT = Kit(
     add_options=_add_options,
     bench=_bench,
     wire=_wire,
-    fires="take the canopy out and the charge or spring out of the trigger, and keep clear of it",
+    fires="take the canopy out and the charge or spring out of every trigger on the bus, and keep "
+    "clear of them",
     simulated=_simulated,
 )

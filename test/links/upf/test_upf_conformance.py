@@ -1,10 +1,12 @@
-"""The kit on the simulated UPF controller, sound and broken in each clause, in virtual time."""
+"""The kit on the simulated UPF controller and trigger, sound and broken in each clause, in virtual
+time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import cycle
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -16,35 +18,44 @@ from chute_ros.conformance.clause import SOAK, Risk, Verdict
 from chute_ros.conformance.session import Allowed, Session
 from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.upf.conformance import CLAUSES
-from chute_ros.links.upf.conformance.bench import DNA, UpfBench
+from chute_ros.links.upf.conformance.bench import (
+    A_CONTROLLER,
+    A_TRIGGER,
+    DNA,
+    TRIGGER,
+    UpfBench,
+)
+from chute_ros.links.upf.conformance.trigger import BROADCAST
 from chute_ros.links.upf.kit import KIT
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.broken import BREAKS
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NODE_STATUS
-from chute_ros.links.upf.simulator.trigger import UpfTrigger
+from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.transport.data_types import load_data_types
 
 NAMES = [one.name for one in CLAUSES]
 DEFINITIONS = Definitions(load_data_types("", ""))
+OTHER_TYPES = Path(__file__).parents[2] / "dsdl_other" / "flyfire"
 
 
 class Run(KitRun):
-    """A controller, a trigger and the kit on one bus."""
+    """A controller, a trigger and the kit on one bus. options: what is given."""
 
-    def __init__(self, risk: Risk) -> None:
-        self.controller, self.trigger = UpfController(DEFINITIONS), UpfTrigger(DEFINITIONS)
-        self.bench = UpfBench(DEFINITIONS, risk)
-        bus = UpfBus([self.controller, self.trigger])
-        super().__init__(Session(self.bench, CLAUSES, Allowed(risk)), bus)
+    def __init__(self, risk: Risk, *options: str, definitions: Definitions = DEFINITIONS) -> None:
+        self.controller, self.trigger = UpfController(definitions), UpfTrigger(definitions)
+        device = A_TRIGGER if TRIGGER in options else A_CONTROLLER
+        self.bench = UpfBench(definitions, risk, device=device)
+        self.bus = UpfBus([self.controller, self.trigger])
+        super().__init__(Session(self.bench, CLAUSES, Allowed(risk, options)), self.bus)
 
 
 def simulated(broken: str) -> VirtualLine:
@@ -54,12 +65,13 @@ def simulated(broken: str) -> VirtualLine:
     return line
 
 
-@pytest.mark.parametrize("needs", [SOAK, DNA])
-def test_a_sound_controller_passes_all_that_is_allowed(needs: str) -> None:
-    device, bench = KIT.simulated("", needs)
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, (needs,))), device)
+@pytest.mark.parametrize("given", [(SOAK,), (DNA,), (TRIGGER, SOAK), (TRIGGER, DNA)])
+def test_a_sound_device_passes_all_that_is_allowed(given: tuple[str, ...]) -> None:
+    device, bench = KIT.simulated("", " ".join(given))
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, given)), device)
     line.run()
-    assert of(line, Verdict.PASSED) == [one.name for one in CLAUSES if one.needs in ("", needs)]
+    met = [one for one in CLAUSES if {*one.needs.split()} <= {*given}]
+    assert of(line, Verdict.PASSED) == [one.name for one in met if one.without not in given]
     assert problem(line) == ""
 
 
@@ -68,7 +80,7 @@ def test_each_clause_has_a_way_to_be_broken() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_controller_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
+def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
     line = simulated(name)
     assert of(line, Verdict.FAILED) == [name]
     assert results(line)[name].why
@@ -207,7 +219,7 @@ def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start()
     run = Run(Risk.NONE)
     run.controller.services[bus_requests.RESTART_NODE] = lambda _: None
     (restart,) = (one for one in CLAUSES if one.name == "restart")
-    line = VirtualLine(Session(run.bench, [restart], Allowed()), run.device)
+    line = VirtualLine(Session(run.bench, [restart], Allowed()), run.bus)
     line.run()
     assert of(line, Verdict.FAILED) == ["restart"]
 
@@ -263,21 +275,22 @@ def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
 
 
 @pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.1])
-@pytest.mark.parametrize("name", ["dna", "dna-forgets"])
+@pytest.mark.parametrize("name", ["dna", "dna-forgets", "trigger-dna", "trigger-dna-forgets"])
 def test_an_abort_gives_it_its_own_node_id_again(name: str, after: float) -> None:
     """Given a Ctrl-C so long after its static node id became 0."""
-    device, bench = KIT.simulated("", DNA)
-    clauses = [one for one in CLAUSES if one.name == name]
-    line = VirtualLine(Session(bench, clauses, Allowed(options=(DNA,))), device)
+    (clause,) = (one for one in CLAUSES if one.name == name)
+    device, bench = KIT.simulated("", clause.needs)
+    line = VirtualLine(Session(bench, [clause], Allowed(options=clause.needs.split())), device)
     assert isinstance(device, UpfBus)
-    controller = device.nodes[0]
-    line.run(lambda: controller.values[p.STATIC_NODE_ID] == 0)
+    tried, static = device.nodes[0], device.nodes[0].values[p.STATIC_NODE_ID]
+    line.run(lambda: tried.values[p.STATIC_NODE_ID] == 0)
     until = line.now + after
     line.run(lambda: line.now >= until)
     line.session.abort("aborted by Ctrl-C", line.now)
     line.run()
     assert problem(line) == "aborted by Ctrl-C"
-    assert controller.node_id == controller.values[p.STATIC_NODE_ID] == CONTROLLER_NODE_ID
+    assert tried.node_id == tried.values[p.STATIC_NODE_ID] == static
+    assert static == (TRIGGER_NODE_ID if TRIGGER in clause.needs else CONTROLLER_NODE_ID)
 
 
 def test_a_device_that_comes_back_without_a_node_id_is_named() -> None:
@@ -321,4 +334,171 @@ def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(
     aps = {"index": 0, "value": p.union_of(True), "name": p.ENABLE_APS.encode()}
     with pytest.raises(NotAllowedError):
         next(UpfBench(DEFINITIONS).call(bus_requests.GET_SET, aps))
+    assert bench.take_output() == []
+
+
+# -- a trigger -----------------------------------------------------------------------------------
+
+FIRING = [one for one in CLAUSES if TRIGGER in one.needs and one.risk is Risk.FIRES]
+
+
+@pytest.mark.parametrize("risk", list(Risk))
+def test_of_a_whole_parachute_the_trigger_alone_is_tried(risk: Risk) -> None:
+    """Given a controller on its bus."""
+    run = Run(risk, TRIGGER)
+    run.line.run()
+    assert run.of(Verdict.FAILED) == []
+    assert run.bench.node == TRIGGER_NODE_ID
+    assert run.trigger.fired == (risk is Risk.FIRES)
+    assert run.trigger.values == run.trigger.saved == TRIGGER_PARAMETERS
+    assert run.controller.requests_heard == []
+    assert run.controller.values == run.controller.saved == CONTROLLER_PARAMETERS
+    asked = [one.name for one in run.bench.traffic if one.sent]
+    assert not any(f"node {CONTROLLER_NODE_ID}" in one for one in asked)
+
+
+def test_a_controller_is_not_taken_for_a_trigger() -> None:
+    """Given a bus without a trigger."""
+    run = Run(Risk.FIRES, TRIGGER)
+    run.bus.nodes.remove(run.trigger)
+    run.line.run()
+    assert run.problem.startswith("no TriggerStatus is received")
+    assert f"nodes heard: {CONTROLLER_NODE_ID}" in run.problem
+    assert run.controller.requests_heard == []
+
+
+@pytest.mark.parametrize("options", [(TRIGGER,), (TRIGGER, BROADCAST)])
+def test_where_several_would_fire_nothing_is_fired(options: tuple[str, ...]) -> None:
+    run = Run(Risk.FIRES, *options)
+    values = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: 35}
+    other = UpfTrigger(DEFINITIONS, NodeSettings("another trigger", values))
+    run.bus.nodes.append(other)
+    run.line.run()
+    assert run.of(Verdict.FAILED) == []
+    assert not run.trigger.fired
+    assert not other.fired
+    sent = {one.name for one in run.bench.traffic if one.sent}
+    assert not any("Trigger" in one for one in sent)
+    assert "(nodes 34, 35; need one)" in run.results["trigger-launch"].why
+
+
+def test_one_that_is_fired_by_the_broadcast_is_not_fired_by_the_service_as_well() -> None:
+    run = Run(Risk.FIRES, TRIGGER, BROADCAST)
+    run.line.run()
+    assert run.results["trigger-broadcast"].verdict is Verdict.PASSED
+    assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
+    assert run.results["trigger-is-launched"].verdict is Verdict.PASSED
+
+
+@pytest.mark.parametrize(
+    ("action", "why"),
+    [("trigger-fired", "it has fired already"), ("trigger-error", "it is ABNORMAL (need READY)")],
+)
+def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action: str, why: str) -> None:
+    run = Run(Risk.FIRES, TRIGGER)
+    run.trigger.add_action("trigger-fired", lambda _: run.trigger.fire("somebody"))
+    run.trigger.act(action)
+    run.line.run()
+    assert run.of(Verdict.FAILED) == []
+    met = [one.name for one in FIRING if BROADCAST not in one.needs][:-1]
+    assert [one for one in met if not run.results[one].why.startswith(why)] == []
+
+
+def test_one_that_fires_by_itself_between_two_clauses_fails_once() -> None:
+    run = Run(Risk.FIRES, TRIGGER)
+    run.line.run(lambda: "trigger-unknown-type" in run.results)
+    run.trigger.fire("itself")
+    run.line.run()
+    assert run.of(Verdict.FAILED) == ["trigger-self-test"]
+    assert run.results["trigger-self-test"].why == "IT HAS FIRED, and nothing told it to"
+    assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
+
+
+def test_one_that_fires_late_by_the_broadcast_did_not_fire_by_itself() -> None:
+    run = Run(Risk.FIRES, TRIGGER, BROADCAST)
+    run.trigger.act("trigger-stuck")
+    run.line.run(lambda: "trigger-broadcast" in run.results)
+    run.trigger.act("trigger-free")
+    run.trigger.fire("the broadcast")
+    run.line.run()
+    assert run.of(Verdict.FAILED) == ["trigger-broadcast"]
+    assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
+
+
+def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_held() -> None:
+    """Given a trigger that falls silent, but for its NodeStatus."""
+    run = Run(Risk.FIRES, TRIGGER)
+    right = run.trigger.services[names.TRIGGER_SERVICE]
+
+    def serve(request: Heard) -> dict[str, object] | None:
+        del run.trigger.broadcasts[names.TRIGGER_STATUS]
+        run.trigger.services[names.TRIGGER_SERVICE] = right
+        return right(request)
+
+    run.trigger.services[names.TRIGGER_SERVICE] = serve
+    run.line.run()
+    assert run.of(Verdict.FAILED) == ["trigger-bad-magic"]
+
+
+def test_a_refusal_to_launch_fails() -> None:
+    run = Run(Risk.FIRES, TRIGGER)
+    run.trigger.act("refuse")
+    run.line.run()
+    assert run.of(Verdict.FAILED) == ["trigger-launch"]
+    assert run.results["trigger-launch"].why == "TYPE_LAUNCH: FAILED"
+
+
+def test_what_the_data_types_do_not_have_is_not_tried() -> None:
+    """Given types of another vendor, with a launch that names no node, and no self test."""
+    definitions = Definitions(load_data_types(str(OTHER_TYPES), "--dsdl-path"))
+    run = Run(Risk.FIRES, TRIGGER, definitions=definitions)
+    run.line.run()
+    assert run.of(Verdict.FAILED) == []
+    assert run.trigger.fired
+    lack = [name for name, one in run.results.items() if one.why.startswith("the data types have")]
+    assert lack == ["trigger-self-test", "trigger-broadcast-other", "trigger-is-launched"]
+
+
+@pytest.mark.parametrize("service", [*UpfTrigger(DEFINITIONS).services])
+def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
+    run = Run(Risk.FIRES, TRIGGER)
+    del run.trigger.services[service]
+    whole(run.line)
+
+
+@settings(max_examples=10)
+@given(
+    states=st.lists(st.integers(0, 7), min_size=1),
+    launched=st.lists(st.booleans(), min_size=1),
+)
+def test_a_trigger_with_any_states_is_tried_to_the_end(
+    states: list[int], launched: list[bool]
+) -> None:
+    run = Run(Risk.FIRES, TRIGGER, BROADCAST)
+    interval, right = run.trigger.broadcasts[names.TRIGGER_STATUS]
+    told = partial(_changed, right, "state", cycle(states))
+    both = partial(_changed, told, "is_launched", cycle(launched))
+    run.trigger.broadcasts[names.TRIGGER_STATUS] = (interval, both)
+    run.line.run()
+    assert [*results(run.line)] == NAMES
+
+
+@pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
+def test_no_launch_leaves_the_bench_unasked(risk: Risk) -> None:
+    bench = UpfBench(DEFINITIONS, risk, device=A_TRIGGER)
+    bench.at(1.0)
+    with pytest.raises(NotAllowedError):
+        bench.launch(magic_number=1)
+    with pytest.raises(NotAllowedError):
+        next(bench.call(names.TRIGGER_SERVICE, {"magic_number": 1, "type": 2}))
+    assert bench.take_output() == []
+
+
+def test_a_bench_that_tries_a_controller_tells_no_trigger_anything() -> None:
+    bench = UpfBench(DEFINITIONS, Risk.FIRES)
+    bench.at(1.0)
+    with pytest.raises(NotAllowedError):
+        bench.launch()
+    with pytest.raises(NotAllowedError):
+        next(bench.call(names.TRIGGER_SERVICE, {"magic_number": 1, "type": 2}))
     assert bench.take_output() == []

@@ -12,13 +12,14 @@ from chute_ros.conformance.clause import Risk, Trial, Wait, failed
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.allocation import Allocator
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
-from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, Kind
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, TRANSFER_IDS, Kind
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
 #: Node id of the vehicle that is simulated here, unless another is chosen.
@@ -33,9 +34,28 @@ TRIES = 3
 STATUS_WITHIN = 3.0
 #: The option of clauses that take the device's node id from it, and how long it may be away, s.
 DNA, _AWAY = "--dna", 12.0
-_FIRES = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE", "TYPE_LAUNCH")
+#: The option with which a trigger is tried, in place of a controller.
+TRIGGER = "--trigger"
+_FIRES = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE")
 #: Whether these are set may decide whether it fires.
 _HARMLESS = (p.AUTO_SAVE, p.LIGHT, p.NODE_STATUS_INTERVAL, p.PARACHUTE_STATUS_INTERVAL)
+
+
+@dataclass(frozen=True)
+class DeviceKind:
+    """What can be tried. status: the message by which it is found; up: the state that ends its
+    start (empty: any); node_id, parameters: what the document gives it."""
+
+    status: str
+    up: str
+    node_id: int
+    parameters: tuple[str, ...]
+
+
+A_CONTROLLER = DeviceKind(
+    names.PARACHUTE_STATUS, "READY", CONTROLLER_NODE_ID, tuple(one.name for one in p.PARAMETERS)
+)
+A_TRIGGER = DeviceKind(names.TRIGGER_STATUS, "", TRIGGER_NODE_ID, (p.STATIC_NODE_ID,))
 
 
 @dataclass(frozen=True)
@@ -52,8 +72,8 @@ class HeardTransfer(HeardPacket):
 
 class UpfBench(RecordingBench[HeardTransfer]):
     """risk: the highest that the person allows; nothing above it is ever sent. node: of the
-    controller, 0: whoever tells its state. vehicle: the node id that is used here. dna: its own
-    node id may be taken from it."""
+    device, 0: whoever tells its state. vehicle: the node id that is used here. dna: its own
+    node id may be taken from it. device: what is tried; a trigger is told nothing unless it is."""
 
     def __init__(
         self,
@@ -63,14 +83,16 @@ class UpfBench(RecordingBench[HeardTransfer]):
         vehicle: int = VEHICLE,
         soak: float = 0.0,
         dna: bool = False,
+        device: DeviceKind = A_CONTROLLER,
     ) -> None:
         super().__init__(risk)
         self.definitions, self.soak, self.node = definitions, soak, 0
-        #: Of everybody, triggers as well.
+        self.device = device
+        #: Of everybody on the bus.
         self.every: list[HeardTransfer] = []
         #: Parameters that were changed -> what they were.
         self.changed: dict[str, p.Value] = {}
-        #: From which of every it was told to deploy; negative: it was not.
+        #: From which of every it was told to deploy, or a trigger has fired; negative: it was not.
         self.deployed_from = -1
         #: Gives out node ids, while it shall.
         self.allocator, self.gives_out = Allocator({}, (vehicle,)), dna
@@ -200,7 +222,11 @@ class UpfBench(RecordingBench[HeardTransfer]):
     def _check(self, service: str, values: Mapping[str, Any]) -> None:
         """Nothing leaves that is not allowed."""
         risk = Risk.NONE
-        if service in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE):
+        if service in (names.TRIGGER_SERVICE, names.TRIGGER_LAUNCH):
+            if self.device is not A_TRIGGER:
+                raise NotAllowedError(f"{service} needs {TRIGGER}")
+            risk = Risk.FIRES
+        elif service == names.PARACHUTE_SERVICE:
             kind = self._type_of(service, values["type"])
             risk = Risk.FIRES if kind in _FIRES else Risk.ARMS
         elif service == bus_requests.GET_SET and "empty" not in values["value"]:
@@ -222,11 +248,11 @@ class UpfBench(RecordingBench[HeardTransfer]):
     # -- steps of trials ------------------------------------------------------------------------
 
     def find(self) -> Trial:
-        """Who tells the state of a parachute."""
+        """Who tells the state of such a device."""
         began = self.now
 
         def found() -> int:
-            return next((one for one in self._parachutes(0) if self._wanted in (0, one)), 0)
+            return next((one for one in self._tellers(0) if self._wanted in (0, one)), 0)
 
         yield Wait(began + _FOUND_WITHIN, found)
         self.node = self._home = found()
@@ -235,7 +261,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
             others = sorted({one.transfer.source for one in self.every})
             heard = ", ".join(map(str, others)) or "nobody"
             raise failed(
-                f"no ParachuteStatus is received within {_FOUND_WITHIN:g} s (nodes heard: "
+                f"no {self.status} is received within {_FOUND_WITHIN:g} s (nodes heard: "
                 f"{heard}): check the bus and its bit rate, and the data types (--dsdl-path)"
             )
         self.heard = [one for one in self.every if one.transfer.source == self.node]
@@ -243,10 +269,24 @@ class UpfBench(RecordingBench[HeardTransfer]):
         yield from self.call(bus_requests.GET_NODE_INFO, {}, 1)
         return f"node {self.node}"
 
-    def _parachutes(self, since: int) -> Iterator[int]:
-        """Who has told the state of a parachute, from this place of every on."""
-        told = (one for one in self.every[since:] if one.kind == names.PARACHUTE_STATUS)
+    @property
+    def status(self) -> str:
+        """The message that tells its state, in a word."""
+        return self.device.status.rpartition(".")[2]
+
+    def _tellers(self, since: int) -> Iterator[int]:
+        """Who has told the state of such a device, from this place of every on."""
+        told = (one for one in self.every[since:] if one.kind == self.device.status)
         return (one.transfer.source for one in told)
+
+    def others(self) -> set[int]:
+        """The nodes of other devices of its kind."""
+        return set(self._tellers(0)) - self._ids
+
+    def nobody(self) -> int:
+        """A node id that nobody on the bus has."""
+        heard = {one.transfer.source for one in self.every}
+        return next(one for one in range(HIGHEST_NODE_ID - 2, 0, -1) if one not in heard)
 
     def identity(self) -> Mapping[str, str]:
         """Of its GetNodeInfo."""
@@ -264,7 +304,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def leave(self) -> Trial:
         """Not armed, and its parameters as they were."""
-        may_be_armed = self.done is not Risk.NONE
+        may_be_armed = self.device is A_CONTROLLER and self.done is not Risk.NONE
         if not self.node or not (may_be_armed or self.changed):
             return "nothing was changed"
         left = []
@@ -287,10 +327,10 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def _left_armed(self) -> Any:
         """In words, by its own state."""
-        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
+        status = yield from self.wait_for(self.device.status, STATUS_WITHIN)
         if status is None:
-            return ["it may be LEFT ARMED: no ParachuteStatus shows it"]
-        armed = self.definitions.state(status.values["state"]) is ParachuteState.ARMED
+            return [f"it may be LEFT ARMED: no {self.status} shows it"]
+        armed = self.state_in(status) is ParachuteState.ARMED
         return ["it is LEFT ARMED"] if armed else []
 
     def ask(self, type_name: str) -> Any:
@@ -305,10 +345,15 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.noted(True, "us", time_sync.MESSAGE, str(microseconds), b"")
         self._endpoint.broadcast(time_sync.MESSAGE, values)
 
-    def triggers(self) -> list[int]:
-        """The nodes that have told the state of a trigger."""
-        told = {one.transfer.source for one in self.every if one.kind == names.TRIGGER_STATUS}
-        return sorted(told)
+    def launch(self, **told: int) -> None:
+        """TriggerLaunch, which is for every trigger on the bus, with these fields otherwise."""
+        name = names.TRIGGER_LAUNCH
+        magic = {"magic_number": self.definitions.constant(name, names.MAGIC)}
+        values = self.definitions.present(name, {**magic, **told})
+        self._check(name, values)
+        text = ", ".join(f"{key}={value}" for key, value in values.items())
+        self.noted(True, "us", name, text, b"")
+        self._endpoint.broadcast(name, values)
 
     def get(self, name: str = "", index: int = 0) -> Any:
         """The response of GetSet (its values); None: not answered."""
@@ -349,13 +394,13 @@ class UpfBench(RecordingBench[HeardTransfer]):
         return ""
 
     def comes_back(self, within: float) -> Any:
-        """Whether a parachute tells its state within so many s, under its new node id."""
+        """Whether it tells its state within so many s, under its new node id."""
         since = len(self.every)
-        # Another parachute on this bus is not the one that was sent away.
-        others = set(self._parachutes(0)) - self._ids
+        # Another one on this bus is not the one that was sent away.
+        others = self.others()
 
         def found() -> int:
-            return next((one for one in self._parachutes(since) if one not in others), 0)
+            return next((one for one in self._tellers(since) if one not in others), 0)
 
         self.gives_out = True
         yield Wait(self.now + within, found)
@@ -369,19 +414,29 @@ class UpfBench(RecordingBench[HeardTransfer]):
             return False
         yield from self.save_and_restart()
         self.node = self._home
-        return (yield from self.reaches(ParachuteState.READY, _AWAY))
+        return (yield from self.is_up(_AWAY))
+
+    def state_in(self, status: HeardTransfer) -> ParachuteState | None:
+        """The state in its status; None: a number without a name, or the types do not tell it."""
+        name = self.definitions.state_name(status.kind, status.values)
+        return ParachuteState.__members__.get(name)
 
     def state(self) -> Any:
-        """The state (ParachuteState) that it tells next; None: a number without a name."""
-        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
+        """The state (state_in) that it tells next."""
+        status = yield from self.wait_for(self.device.status, STATUS_WITHIN)
         if status is None:
-            raise failed(f"no ParachuteStatus within {STATUS_WITHIN:g} s")
-        return self.definitions.state(status.values["state"])
+            raise failed(f"no {self.status} within {STATUS_WITHIN:g} s")
+        return self.state_in(status)
 
     def reaches(self, state: ParachuteState, within: float) -> Any:
         """Whether it tells this state within so many s."""
-        number = self.definitions.state_number(state)
         told = yield from self.wait_for(
-            names.PARACHUTE_STATUS, within, lambda one: one.values["state"] == number
+            self.device.status, within, lambda one: self.state_in(one) is state
         )
         return told is not None
+
+    def is_up(self, within: float) -> Any:
+        """Whether its start has ended within so many s."""
+        if self.device.up:
+            return (yield from self.reaches(ParachuteState[self.device.up], within))
+        return (yield from self.wait_for(self.device.status, within)) is not None

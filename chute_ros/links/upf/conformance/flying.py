@@ -14,9 +14,9 @@ from chute_ros.model import ParachuteState
 
 _S = ParachuteState
 _MOVES = "it moves through its states, up to ARMED: its APS may fire if it is shaken or dropped"
-_MAY = "it must not, but it may FIRE"
+MAY_FIRE = "it must not, but it may FIRE"
 #: A state is told so soon after what moves it, s; it fires after so long at most.
-_TOLD_WITHIN, _FIRES_WITHIN = 1.5, 4.0
+_TOLD_WITHIN, FIRES_WITHIN = 1.5, 4.0
 #: At rest for 5 s, and a while to tell.
 _RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
 _AUTOMATIC = (p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND)
@@ -141,7 +141,7 @@ def _disabled(bench: UpfBench) -> Trial:
         raise failed(f"{p.ENABLE_PARACHUTE} cannot be switched off")
     since = len(bench.every)
     result = yield from bench.ask("TYPE_DEPLOY_FORCE")
-    yield from bench.watch_on(_FIRES_WITHIN)
+    yield from bench.watch_on(FIRES_WITHIN)
     fired = _launches(bench, since) or (yield from bench.state()) in DEPLOYED
     yield from bench.set(p.ENABLE_PARACHUTE, True)
     if fired:
@@ -161,7 +161,7 @@ def _tells_launched(bench: UpfBench, one: HeardTransfer) -> bool:
     """Of the controller, that it is LAUNCHED."""
     if one.kind != names.PARACHUTE_STATUS or one.transfer.source != bench.node:
         return False
-    return bench.definitions.state(one.values["state"]) is _S.LAUNCHED
+    return bench.state_in(one) is _S.LAUNCHED
 
 
 def _deploy(bench: UpfBench) -> Trial:
@@ -178,10 +178,10 @@ def _deploy(bench: UpfBench) -> Trial:
     def out() -> bool:
         return any(_tells_launched(bench, one) for one in bench.every[bench.deployed_from :])
 
-    yield Wait(began + _FIRES_WITHIN, out)
+    yield Wait(began + FIRES_WITHIN, out)
     if not out():
         bench.deployed_from = -1
-        raise failed(f"SUCCESS, and it is not LAUNCHED within {_FIRES_WITHIN:g} s")
+        raise failed(f"SUCCESS, and it is not LAUNCHED within {FIRES_WITHIN:g} s")
     return f"LAUNCHED after {bench.now - began:.2f} s"
 
 
@@ -244,7 +244,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         "disabled",
         "with Enable Parachute off nothing deploys, not even TYPE_DEPLOY_FORCE",
         _disabled,
-        _MAY,
+        MAY_FIRE,
         Risk.FIRES,
     ),
     clause(_STATES, "deploy", "TYPE_DEPLOY: LAUNCHED", _deploy, "IT FIRES", Risk.FIRES),

@@ -22,7 +22,6 @@ from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, Up
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.devices import OPERATIONAL, mode_name
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan import time_sync
@@ -87,20 +86,20 @@ def _node_mode(bench: UpfBench) -> Trial:
         raise not_tried("no NodeStatus came")
     # It may tell its state before the NodeStatus that goes with it.
     since = told[-1].at - _LONGEST_STATUS * (1.0 + _SHARE)
-    not_ready = bench.definitions.state_number(ParachuteState.NOT_READY)
-    states = (one for one in bench.heard if one.kind == names.PARACHUTE_STATUS and one.at >= since)
-    if any(one.values["state"] == not_ready for one in states):
+    states = (one for one in bench.heard if one.kind == bench.device.status and one.at >= since)
+    if any(bench.state_in(one) is ParachuteState.NOT_READY for one in states):
         raise not_tried("it was NOT_READY a moment before")
     if (mode := told[-1].values["mode"]) != OPERATIONAL:
         raise failed(f"NodeStatus reports mode {mode_name(mode)}", [told[-1].packet])
     return mode_name(mode)
 
 
-def _node_id(bench: UpfBench) -> Trial:
+def node_id(bench: UpfBench) -> Trial:
+    """That of the document, as it is delivered."""
     default = yield from bench.value(p.STATIC_NODE_ID, "default_value")
-    if default != CONTROLLER_NODE_ID:
+    if default != bench.device.node_id:
         raise failed(f"its static node id as delivered is {p.words(default) or 'not told'}")
-    return f"as delivered {CONTROLLER_NODE_ID}; it is {bench.node}"
+    return f"as delivered {default}; it is {bench.node}"
 
 
 def _information(bench: UpfBench) -> Trial:
@@ -146,13 +145,16 @@ def _status_interval(bench: UpfBench) -> Trial:
     return f"each {mean:.3f} s, as its parameter says"
 
 
-def _state_known(bench: UpfBench) -> Trial:
+def state_known(bench: UpfBench) -> Trial:
+    """All that it has told so far."""
     yield from ()
-    for one in bench.heard:
-        told = one.kind == names.PARACHUTE_STATUS
-        if told and bench.definitions.state(one.values["state"]) is None:
-            raise failed(f"state is {one.values['state']}, which is none", [one.packet])
-    return "1 to 7"
+    told = [one for one in bench.heard if one.kind == bench.device.status]
+    if any("state" not in one.values for one in told):
+        raise not_tried("the data types have no state of it")
+    named = {bench.definitions.state_name(one.kind, one.values): one for one in told}
+    if wrong := named.get(""):
+        raise failed(f"state is {wrong.values['state']}, which is none", [wrong.packet])
+    return ", ".join(named)
 
 
 def _present(bench: UpfBench) -> Trial:
@@ -190,7 +192,7 @@ def _in_order(bench: UpfBench) -> Trial:
         found.append(bytes(answer["name"]).decode("utf-8", "replace"))
     else:
         raise failed(f"its list does not end after {len(found)} parameters")
-    if missing := [one.name for one in p.PARAMETERS if one.name not in found]:
+    if missing := [one for one in bench.device.parameters if one not in found]:
         raise failed(f"by index there is no {', '.join(missing)}")
     return f"{len(found)} parameters"
 
@@ -296,15 +298,16 @@ def _restart(bench: UpfBench) -> Trial:
     if not obeys:
         raise failed("RestartNode is not ok")
     yield from bench.reaches(ParachuteState.NOT_READY, 5.0)
-    ready = yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
+    is_up = yield from bench.is_up(READY_WITHIN)
+    up = bench.device.up or "heard"
     yield from bench.watch_on(0.5)
     yield Wait(bench.now + _LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
     if bench.starts == starts:
         raise failed("uptime_sec does not begin anew", bench.packets(NODE_STATUS)[:2])
-    if not ready:
-        raise failed(f"it is not READY within {READY_WITHIN:g} s")
-    return "it starts anew, and is READY"
+    if not is_up:
+        raise failed(f"it is not {up} within {READY_WITHIN:g} s")
+    return f"it starts anew, and is {up}"
 
 
 def _blocks_at_start(bench: UpfBench) -> Trial:
@@ -369,7 +372,7 @@ def _after_restart(bench: UpfBench, name: str) -> Trial:
 
 
 def _time_sync(bench: UpfBench) -> Trial:
-    yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
+    yield from bench.is_up(READY_WITHIN)
     before = yield from bench.state()
     bench.tell_time(0)
     for number in range(3):
@@ -379,22 +382,6 @@ def _time_sync(bench: UpfBench) -> Trial:
     if after is not before:
         raise failed(f"the time of the bus moved it from {before} to {after}")
     return "it goes on; nothing that it tells shows the time that it has"
-
-
-def _trigger_id(bench: UpfBench) -> Trial:
-    triggers = bench.triggers()
-    if not triggers:
-        raise not_tried("no TriggerStatus is received")
-    defaults = []
-    for node in triggers:
-        values = {"index": 0, "value": {"empty": {}}, "name": p.STATIC_NODE_ID.encode()}
-        answer = yield from bench.call(bus_requests.GET_SET, values, node=node)
-        defaults.append(None if answer is None else p.value_of(answer["default_value"]))
-    for node, default in zip(triggers, defaults, strict=True):
-        if default != TRIGGER_NODE_ID:
-            told = p.words(default) or "not told"
-            raise failed(f"the static node id of trigger {node} as delivered is {told}")
-    return f"as delivered {TRIGGER_NODE_ID}; it is {', '.join(map(str, triggers))}"
 
 
 def _soak(bench: UpfBench) -> Trial:
@@ -425,8 +412,8 @@ CLAUSES: tuple[UpfClause, ...] = (
         "ParachuteStatus is broadcast, as often as its parameter says",
         _status_interval,
     ),
-    clause(_STATES, "state-known", "its state is one of the seven", _state_known, READS),
-    clause(_NODE, "node-id", "the static node id as delivered is 33", _node_id),
+    clause(_STATES, "state-known", "its state is one of the seven", state_known, READS),
+    clause(_NODE, "node-id", "the static node id as delivered is 33", node_id),
     clause(_STANDARD, "node-info", "GetNodeInfo tells who it is", _information),
     clause(_STANDARD, "transport-stats", "GetTransportStats is answered", _statistics),
     clause(_PARAMETERS, "parameters", "it has each parameter of the document", _present),
@@ -482,9 +469,6 @@ CLAUSES: tuple[UpfClause, ...] = (
     ),
     clause(
         _STANDARD, "time-sync", "GlobalTimeSync does it no harm", _time_sync, "it is told a time"
-    ),
-    clause(
-        _NODE, "trigger-node-id", "the static node id of a trigger as delivered is 34", _trigger_id
     ),
     clause(
         "Over hours",

@@ -12,7 +12,7 @@ from chute_ros.links.upf.conformance.standard import UpfClause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind, frames_of, head_of
+from chute_ros.protocol.dronecan.transfer import Kind, frames_of, head_of
 
 _DOCUMENT, _SECTION = "DroneCAN specification", "CAN bus transport layer"
 #: What is set by frames that are spoilt, ms: other than as delivered.
@@ -82,8 +82,7 @@ def _spoilt(
 
 
 def _other_node(bench: UpfBench) -> Trial:
-    heard = {one.transfer.source for one in bench.every}
-    other = next(one for one in range(HIGHEST_NODE_ID - 2, 0, -1) if one not in heard)
+    other = bench.nobody()
     since = len(bench.heard)
     yield from bench.call(bus_requests.GET_NODE_INFO, {}, 1, node=other)
     for one in bench.heard[since:]:

@@ -1,11 +1,12 @@
-"""A UPF controller that is wrong in one thing: for each clause of the conformance kit one way."""
+"""A UPF controller or trigger that is wrong in one thing: for each clause of the conformance kit
+one way."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
@@ -14,10 +15,13 @@ from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
-from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.spoilt import SpoiltRequests
-from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
+from chute_ros.links.upf.simulator.trigger import (
+    STATUS_INTERVAL,
+    TRIGGER_PARAMETERS,
+    UpfTrigger,
+)
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.endpoint import Heard
@@ -30,6 +34,10 @@ _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
 _TAKES_OFF_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
 #: It is silent for so long after it was first told the time, and after spoilt frames, s.
 _STANDS_STILL, _STUNNED = 6.4, 2.3
+#: Its TriggerStatus comes so seldom, for so long after its first start, s.
+_SELDOM, _SELDOM_FOR = 4.0, 9.0
+#: With what the names of the clauses of a trigger begin.
+_TRIGGER = "trigger-"
 #: Request -> the clause that it breaks by its answer, though it does as it is told.
 _ANSWERS = {
     "TYPE_TAKEOFF": "takeoff",
@@ -45,19 +53,16 @@ _NOT_ASKED = {
 }
 
 
-class BrokenController(UpfController):
-    """breaks: the name of a clause."""
+class BrokenNode(UpfNode):
+    """Wrong as a node on the bus. breaks: the name of a clause of a controller."""
 
-    def __init__(
-        self, definitions: Definitions, settings: ControllerSettings, breaks: str
-    ) -> None:
-        self.breaks = breaks
-        super().__init__(definitions, settings)
-        self._first_start = self._ready_since = math.nan
-        self._dumb_until = -math.inf
-        self._spoilt = SpoiltRequests(definitions.types)
-        if change := _CHANGES.get(breaks):
-            change(self)
+    breaks = ""
+    _first_start, _dumb_until = math.nan, -math.inf
+
+    @property
+    def up(self) -> float:
+        """Since its first start, s."""
+        return self.now - self._first_start
 
     def start(self, now: float) -> None:
         if math.isnan(self._first_start):
@@ -76,20 +81,10 @@ class BrokenController(UpfController):
         if self.breaks == "other-node":
             data = self._as_its_own(data)
         super().receive(data, now)
-        if self.breaks and self._spoilt.observe(data) == self.breaks:
-            self._is_wrong_about_it(now)
         if self.breaks == "time-sync" and self.clock.master and not synced:
             self._dumb_until = now + _STANDS_STILL
         if self.breaks == "dna" and asked and self.node_id:
             self.endpoint.node_id -= 1
-
-    def _is_wrong_about_it(self, now: float) -> None:
-        """It carries out what has a wrong CRC; all else makes it silent for a while."""
-        if self.breaks == "wrong-crc":
-            for frame in self._spoilt.mended():
-                super().receive(pack(frame), now)
-        else:
-            self._dumb_until = now + _STUNNED
 
     def _as_its_own(self, data: bytes) -> bytes:
         """A request to another node, as if it were for this one."""
@@ -102,11 +97,38 @@ class BrokenController(UpfController):
         return pack(replace(frame, identifier=identifier))
 
     def take_output(self) -> list[bytes]:
-        frames, up = super().take_output(), self.now - self._first_start
+        frames = super().take_output()
         if self.now < self._dumb_until:
             return []
-        pauses = self.breaks == "soak" and _PAUSES_AT <= up < _PAUSES_AT + _PAUSES_FOR
+        pauses = self.breaks == "soak" and _PAUSES_AT <= self.up < _PAUSES_AT + _PAUSES_FOR
         return [] if pauses else frames
+
+
+class BrokenController(BrokenNode, UpfController):
+    """breaks: the name of a clause."""
+
+    def __init__(
+        self, definitions: Definitions, settings: ControllerSettings, breaks: str
+    ) -> None:
+        self.breaks = breaks
+        super().__init__(definitions, settings)
+        self._ready_since = math.nan
+        self._spoilt = SpoiltRequests(definitions.types)
+        if change := _NODE_CHANGES.get(breaks) or _CONTROLLER_CHANGES.get(breaks):
+            change(self)
+
+    def receive(self, data: bytes, now: float) -> None:
+        super().receive(data, now)
+        if self.breaks and self._spoilt.observe(data) == self.breaks:
+            self._is_wrong_about_it(now)
+
+    def _is_wrong_about_it(self, now: float) -> None:
+        """It carries out what has a wrong CRC; all else makes it silent for a while."""
+        if self.breaks == "wrong-crc":
+            for frame in self._spoilt.mended():
+                super().receive(pack(frame), now)
+        else:
+            self._dumb_until = now + _STUNNED
 
     def step(self, now: float) -> None:
         super().step(now)
@@ -115,11 +137,6 @@ class BrokenController(UpfController):
         by_itself = now - self._ready_since >= _TAKES_OFF_AFTER
         if self.breaks == "no-auto-takeoff" and by_itself:
             self._move(Event.TAKEOFF)
-
-    def status(self) -> dict[str, Any]:
-        told = super().status()
-        first = self.now - self._first_start < _TELLS_NONE_FOR
-        return {**told, "state": 0} if self.breaks == "state-known" and first else told
 
     def decide(self, name: str) -> str:
         if name == "" and self.breaks == "unknown-type":
@@ -151,6 +168,16 @@ class BrokenController(UpfController):
         return super()._ask_vehicle(type_name)
 
 
+class BrokenTrigger(BrokenNode, UpfTrigger):
+    """clause: its name."""
+
+    def __init__(self, definitions: Definitions, settings: NodeSettings, clause: str) -> None:
+        self.breaks = clause.removeprefix(_TRIGGER)
+        super().__init__(definitions, settings)
+        if change := _NODE_CHANGES.get(self.breaks) or _TRIGGER_CHANGES.get(clause):
+            change(self)
+
+
 def simulated_controller(
     definitions: Definitions, settings: ControllerSettings, breaks: str
 ) -> UpfController:
@@ -163,31 +190,34 @@ def simulated_controller(
 def simulated_trigger(
     definitions: Definitions, name: str, node_id: int, breaks: str
 ) -> UpfTrigger:
-    """A simulated trigger of a controller that breaks this, as it is delivered."""
+    """A simulated trigger, as it is delivered. breaks: as simulated_controller."""
     wrong = breaks == "trigger-node-id" and node_id == TRIGGER_NODE_ID
     values = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: node_id + wrong}
+    if breaks.startswith(_TRIGGER):
+        return BrokenTrigger(definitions, NodeSettings(name, values), breaks)
     return UpfTrigger(definitions, NodeSettings(name, values))
 
 
 Answer = dict[str, Any] | None
+NodeT = TypeVar("NodeT", bound=BrokenNode)
 
 
 def _answers(
-    service: str, change: Callable[[BrokenController, Heard, Any], Answer]
-) -> Callable[[BrokenController], None]:
+    service: str, change: Callable[[NodeT, Heard, Any], Answer]
+) -> Callable[[NodeT], None]:
     """It answers a request otherwise: change gets the right answer."""
 
-    def apply(device: BrokenController) -> None:
+    def apply(device: NodeT) -> None:
         right = device.services[service]
         device.services[service] = lambda request: change(device, request, right(request))
 
     return apply
 
 
-def _parameter(name: str, **told: Any) -> Callable[[BrokenController], None]:
+def _parameter(name: str, **told: Any) -> Callable[[BrokenNode], None]:
     """It tells this parameter otherwise, by its name."""
 
-    def change(_: BrokenController, request: Heard, answer: Any) -> Answer:
+    def change(_: BrokenNode, request: Heard, answer: Any) -> Answer:
         return {**answer, **told} if _named(request) == name else answer
 
     return _answers(bus_requests.GET_SET, change)
@@ -198,16 +228,29 @@ def _named(request: Heard) -> str:
 
 
 def _interval(
-    message: str, interval: Callable[[BrokenController], float]
-) -> Callable[[BrokenController], None]:
-    def apply(device: BrokenController) -> None:
+    message: str, interval: Callable[[BrokenNode], float]
+) -> Callable[[BrokenNode], None]:
+    def apply(device: BrokenNode) -> None:
         _, make = device.broadcasts[message]
         device.broadcasts[message] = (lambda: interval(device), make)
 
     return apply
 
 
-def _is_slow(device: BrokenController) -> None:
+def _tells(message: str, until: float = math.inf, **told: int) -> Callable[[BrokenNode], None]:
+    """Its message tells this, until so long after its first start (s)."""
+
+    def apply(device: BrokenNode) -> None:
+        interval, make = device.broadcasts[message]
+        device.broadcasts[message] = (
+            interval,
+            lambda: {**make(), **(told if device.up < until else {})},
+        )
+
+    return apply
+
+
+def _is_slow(device: BrokenNode) -> None:
     """Its clock."""
     interval, make = device.broadcasts[NODE_STATUS]
     device.broadcasts[NODE_STATUS] = (
@@ -216,17 +259,7 @@ def _is_slow(device: BrokenController) -> None:
     )
 
 
-def _updates_for_ever(device: BrokenController) -> None:
-    _node_status(device, mode=3)
-
-
-def _node_status(device: BrokenController, **told: int) -> None:
-    """Its NodeStatus tells this."""
-    interval, make = device.broadcasts[NODE_STATUS]
-    device.broadcasts[NODE_STATUS] = (interval, lambda: {**make(), **told})
-
-
-def _no_id(_: BrokenController, request: Heard, answer: Any) -> Answer:
+def _no_id(_: BrokenNode, request: Heard, answer: Any) -> Answer:
     return {**answer, "hardware_version": {"major": 3, "unique_id": bytes(16)}}
 
 
@@ -234,12 +267,12 @@ def _lacks_light(_: BrokenController, request: Heard, answer: Any) -> Answer:
     return {} if _named(request) == p.LIGHT else answer
 
 
-def _endless(device: BrokenController, request: Heard, answer: Any) -> Answer:
+def _endless(device: BrokenNode, request: Heard, answer: Any) -> Answer:
     at_end = not _named(request) and not answer
     return device.memory.answer(p.LIGHT) if at_end else answer
 
 
-def _any_name(device: BrokenController, request: Heard, answer: Any) -> Answer:
+def _any_name(device: BrokenNode, request: Heard, answer: Any) -> Answer:
     known = bool(answer) or not _named(request)
     return answer if known else device.memory.answer(p.LIGHT)
 
@@ -263,57 +296,122 @@ def _always_saves(device: BrokenController) -> None:
     device.memory.set = keep  # type: ignore[method-assign]
 
 
-def _any_magic(device: BrokenController) -> None:
-    service = names.PARACHUTE_SERVICE
-    right = device.services[service]
-    magic = device.definitions.types.request(service).constants[names.MAGIC]
+def _any_magic(service: str) -> Callable[[BrokenNode], None]:
+    def apply(device: BrokenNode) -> None:
+        right = device.services[service]
+        magic = device.definitions.types.request(service).constants[names.MAGIC]
+        device.services[service] = lambda request: right(
+            replace(request, values={**request.values, "magic_number": magic})
+        )
 
-    def serve(request: Heard) -> Answer:
-        values: Mapping[str, Any] = {**request.values, "magic_number": magic}
-        whole = Heard(request.kind, request.name, request.source, request.transfer_id, {**values})
-        return right(whole)
-
-    device.services[service] = serve
+    return apply
 
 
-def _pace(device: BrokenController, name: str) -> float:
+def _pace(device: BrokenNode, name: str) -> float:
     """A third of what its parameter says as it is delivered; as it says when it is set."""
-    told, delivered = device.values[name], CONTROLLER_PARAMETERS[name]
+    told, delivered = device.values[name], device.settings.values[name]
     return float(told) / 1000.0 * (3.0 if told == delivered else 1.0)
 
 
-_CHANGES: dict[str, Callable[[BrokenController], None]] = {
+def _is_type(device: UpfNode, request: Heard, name: str) -> bool:
+    """A TriggerService request of this type; empty: one that is none."""
+    service = names.TRIGGER_SERVICE
+    is_good = device.definitions.magic_is_good(service, request.values)
+    return is_good and device.definitions.type_name(service, request.values) == name
+
+
+def _says_yes(type_name: str) -> Callable[[BrokenTrigger], None]:
+    """TriggerService answers this with SUCCESS, and does nothing."""
+
+    def apply(device: BrokenTrigger) -> None:
+        service = names.TRIGGER_SERVICE
+        right, yes = device.services[service], device.definitions.result(service, "SUCCESS")
+        device.services[service] = lambda request: (
+            yes if _is_type(device, request, type_name) else right(request)
+        )
+
+    return apply
+
+
+def _fires_by_test(device: BrokenTrigger, request: Heard, answer: Any) -> Answer:
+    if _is_type(device, request, "TYPE_SELF_TEST"):
+        device.fire("its self test")
+    return dict(answer)
+
+
+def _hears_launch(**otherwise: Callable[[BrokenTrigger], int]) -> Callable[[BrokenTrigger], None]:
+    """It takes these fields of TriggerLaunch for something else."""
+
+    def apply(device: BrokenTrigger) -> None:
+        right = device.messages[names.TRIGGER_LAUNCH]
+
+        def hear(source: int, values: Mapping[str, Any]) -> None:
+            right(source, {**values, **{name: one(device) for name, one in otherwise.items()}})
+
+        device.messages[names.TRIGGER_LAUNCH] = hear
+
+    return apply
+
+
+def _launch_magic(device: UpfNode) -> int:
+    return int(device.definitions.constant(names.TRIGGER_LAUNCH, names.MAGIC))
+
+
+_NODE_CHANGES: dict[str, Callable[[BrokenNode], None]] = {
     "node-status": _interval(NODE_STATUS, lambda device: _pace(device, p.NODE_STATUS_INTERVAL)),
-    "node-mode": _updates_for_ever,
+    "node-mode": _tells(NODE_STATUS, mode=3),
     "uptime": _is_slow,
+    "node-info": _answers(bus_requests.GET_NODE_INFO, _no_id),
+    "transport-stats": _answers(bus_requests.TRANSPORT_STATS, lambda *_: None),
+    "parameter-list": _answers(bus_requests.GET_SET, _endless),
+    "parameter-unknown": _answers(bus_requests.GET_SET, _any_name),
+    "opcode-save": _answers(bus_requests.EXECUTE_OPCODE, lambda *_: {"ok": False}),
+    "restart-magic": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": True}),
+    "restart": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": False}),
+}
+_CONTROLLER_CHANGES: dict[str, Callable[[BrokenController], None]] = {
     "status-interval": _interval(
         names.PARACHUTE_STATUS, lambda device: _pace(device, p.PARACHUTE_STATUS_INTERVAL)
     ),
+    "state-known": _tells(names.PARACHUTE_STATUS, _TELLS_NONE_FOR, state=0),
     "node-id": _parameter(p.STATIC_NODE_ID, default_value=p.union_of(12)),
-    "node-info": _answers(bus_requests.GET_NODE_INFO, _no_id),
-    "transport-stats": _answers(bus_requests.TRANSPORT_STATS, lambda *_: None),
     "parameters": _answers(bus_requests.GET_SET, _lacks_light),
     "parameter-kinds": _parameter(p.LIGHT, value=p.union_of("on")),
-    "parameter-list": _answers(bus_requests.GET_SET, _endless),
-    "parameter-unknown": _answers(bus_requests.GET_SET, _any_name),
     "resister-off": _parameter(p.CANBUS_RESISTER, default_value=p.union_of(True)),
     "node-interval": _interval(NODE_STATUS, lambda device: 1.0),
     "parachute-interval": _interval(names.PARACHUTE_STATUS, lambda device: 0.1),
     "parameter-range": _answers(bus_requests.GET_SET, _takes_all),
-    "opcode-save": _answers(bus_requests.EXECUTE_OPCODE, lambda *_: {"ok": False}),
-    "restart-magic": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": True}),
-    "restart": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": False}),
     "auto-save": _always_saves,
-    "bad-magic": _any_magic,
+    "bad-magic": _any_magic(names.PARACHUTE_SERVICE),
 }
+_TRIGGER_CHANGES: dict[str, Callable[[BrokenTrigger], None]] = {
+    "trigger-status": _interval(
+        names.TRIGGER_STATUS,
+        lambda device: _SELDOM if device.up < _SELDOM_FOR else STATUS_INTERVAL,
+    ),
+    "trigger-state-known": _tells(names.TRIGGER_STATUS, _TELLS_NONE_FOR, state=0),
+    "trigger-bad-magic": _any_magic(names.TRIGGER_SERVICE),
+    "trigger-unknown-type": _says_yes(""),
+    "trigger-self-test": _answers(names.TRIGGER_SERVICE, _fires_by_test),
+    "trigger-broadcast-magic": _hears_launch(magic_number=_launch_magic),
+    "trigger-broadcast-other": _hears_launch(node_id=lambda device: device.node_id),
+    "trigger-broadcast": _hears_launch(magic_number=lambda _: 0),
+    "trigger-launch": _says_yes("TYPE_LAUNCH"),
+    "trigger-is-launched": _tells(names.TRIGGER_STATUS, is_launched=False),
+}
+#: Breaks of any node that have no entry above.
+_NODE_BREAKS = ("time-sync", "soak", "other-node", "dna", "dna-forgets")
 #: Clauses that a device can break.
 BREAKS = (
-    *_CHANGES,
+    *_NODE_CHANGES,
+    *_NODE_BREAKS,
+    *_CONTROLLER_CHANGES,
     *_NOT_ASKED,
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
-    *("state-known", "soak", "unknown-type", "no-auto-takeoff", "arm-order"),
-    *("disabled", "deploy", "touchdown", "dna", "dna-forgets"),
-    *("time-sync", "trigger-node-id", "lost-frame", "reordered-frames", "doubled-frames"),
-    *("cut-transfer", "wrong-crc", "foreign-frames", "other-node"),
+    *("unknown-type", "no-auto-takeoff", "arm-order", "disabled", "deploy", "touchdown"),
+    *("lost-frame", "reordered-frames", "doubled-frames"),
+    *("cut-transfer", "wrong-crc", "foreign-frames"),
+    *(f"{_TRIGGER}{name}" for name in (*_NODE_CHANGES, *_NODE_BREAKS, "node-id")),
+    *_TRIGGER_CHANGES,
 )

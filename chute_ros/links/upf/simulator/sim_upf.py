@@ -63,7 +63,8 @@ def _run() -> None:
         dest="breaks",
         default="",
         metavar="CLAUSE",
-        help="the controller is wrong in this clause of `conformance upf` (its --list names them)",
+        help="the controller, or the trigger in a clause trigger-*, is wrong in this clause of "
+        "`conformance upf` (its --list names them)",
     )
     chosen = options.parse_args()
 
