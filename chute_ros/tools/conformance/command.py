@@ -140,25 +140,28 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
         _junit()
     if risk is not Risk.NONE:
         _ask(kit, risk)
-    began = time.time_ns()
-    results, found, problem = _tried(Session(bench, clauses, Allowed(risk, given)), wire)
-    about = {
-        "device": found or "not found",
-        **bench.identity(),
-        "connection": chosen.connection,
-        "allowed": risk.name,
-        "kit": f"chute_ros {own_version()}",
-        "begun": datetime.fromtimestamp(began / 1e9, timezone.utc).isoformat(timespec="seconds"),
-        "computer": f"{socket.gethostname()}, Python {platform.python_version()}",
-    }
-    about = {name: plain(text) for name, text in about.items()}
-    report = Report(
-        kit.document, f"{device} {found}".strip(), about, results, problem, bench.traffic, began
-    )
-    _say(report.summary)
-    if problem:
-        _say(f"conformance: {plain(problem)}", sys.stderr)
-    _write(chosen, report)
+    session, events = Session(bench, clauses, Allowed(risk, given)), queue.SimpleQueue[Any]()
+    # They come like any other event: in the middle of a line one would leave the device armed, and
+    # after the last clause its report half written.
+    with at_ctrl_c(lambda number, _: events.put(signal.Signals(number)), _ENDS):
+        began = time.time_ns()
+        results, found, problem = _tried(session, wire, events)
+        begun = datetime.fromtimestamp(began / 1e9, timezone.utc)
+        about = {
+            "device": found or "not found",
+            **bench.identity(),
+            "connection": chosen.connection,
+            "allowed": risk.name,
+            "kit": f"chute_ros {own_version()}",
+            "begun": begun.isoformat(timespec="seconds"),
+            "computer": f"{socket.gethostname()}, Python {platform.python_version()}",
+        }
+        about, whom = {name: plain(text) for name, text in about.items()}, f"{device} {found}"
+        report = Report(kit.document, whom.strip(), about, results, problem, bench.traffic, began)
+        _say(report.summary)
+        if problem:
+            _say(f"conformance: {plain(problem)}", sys.stderr)
+        _write(chosen, report)
     return NOT_WHOLE if problem else FAILED if report.of(Verdict.FAILED) else DONE
 
 
@@ -191,9 +194,10 @@ def _ask(kit: Kit, risk: Risk) -> None:
         raise ChuteError(f"{word} was not typed: nothing was sent")
 
 
-def _tried(session: Session[Bench], wire: Any) -> tuple[list[Result], str, str]:
+def _tried(
+    session: Session[Bench], wire: Any, events: queue.SimpleQueue[Any]
+) -> tuple[list[Result], str, str]:
     """(results, who was found, why it is not whole)."""
-    events: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def deliver(many: list[Any]) -> None:
         for one in many:
@@ -209,31 +213,29 @@ def _tried(session: Session[Bench], wire: Any) -> tuple[list[Result], str, str]:
         ends_at = min(ends_at, time.monotonic() + _ENDS_WITHIN)
         loop.call(lambda link, now: link.abort(why, now))
 
-    # They come like any other event: in the middle of a line one would leave the device armed.
-    with at_ctrl_c(lambda number, _: events.put(signal.Signals(number)), _ENDS):
-        loop.start()
-        try:
-            while time.monotonic() < ends_at:
-                event = _next(events)
-                if isinstance(event, Ended):
-                    return results, found, event.problem
-                if isinstance(event, Found):
-                    found = plain(event.text)
-                elif isinstance(event, Result):
-                    results.append(event)
-                elif isinstance(event, signal.Signals):
-                    abort(f"aborted by {_ENDS.get(event, 'Ctrl-C')}")
-                elif isinstance(event, LoopFault):
-                    problem = f"a mistake of the kit: {event.text}"
-                    abort(problem)
-                elif isinstance(event, WireChange) and not event.is_open:
-                    abort(event.text)
-                elif isinstance(event, WireTrouble) and event.text:
-                    _say(f"conformance: {plain(event.text)}", sys.stderr)
-                if (line := _line(event)) and not _say(line):
-                    abort(_UNREAD)
-        finally:
-            loop.stop()
+    loop.start()
+    try:
+        while time.monotonic() < ends_at:
+            event = _next(events)
+            if isinstance(event, Ended):
+                return results, found, event.problem
+            if isinstance(event, Found):
+                found = plain(event.text)
+            elif isinstance(event, Result):
+                results.append(event)
+            elif isinstance(event, signal.Signals):
+                abort(f"aborted by {_ENDS.get(event, 'Ctrl-C')}")
+            elif isinstance(event, LoopFault):
+                problem = f"a mistake of the kit: {event.text}"
+                abort(problem)
+            elif isinstance(event, WireChange) and not event.is_open:
+                abort(event.text)
+            elif isinstance(event, WireTrouble) and event.text:
+                _say(f"conformance: {plain(event.text)}", sys.stderr)
+            if (line := _line(event)) and not _say(line):
+                abort(_UNREAD)
+    finally:
+        loop.stop()
     return results, found, problem or "the device was NOT left disarmed: no answer in time"
 
 
