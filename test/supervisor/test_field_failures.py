@@ -24,6 +24,39 @@ def aloft(name: str = "multirotor", **settings: Any) -> Story:
     return Story(shipped(name, **settings)).ready().fly(1.0)
 
 
+@pytest.mark.parametrize("pressed", [True, False])
+@pytest.mark.parametrize("last", [8.5, 9.0, 9.7, 11.0, 12.0, 13.0, 14.0])
+def test_what_falls_flat_is_deployed(last: float, pressed: bool) -> None:
+    """Given motors that stop, and drag that carries it ever more; PX4's simulator ends at 9.7
+    m/s. Nobody tells what was commanded."""
+    story, height, speed = aloft(), 80.0, 0.0
+    while "DEPLOY" not in story.fired() and height > 20.0:
+        force = 9.81 * (speed / last) ** 2
+        told = {"height": height, "vertical_speed": speed, "acceleration": force}
+        if pressed:
+            told |= {"pressure": 101_325.0 - 12.0 * height, "pressure_age": 0.0}
+        story.fly(story.t + 0.1, every=0.1, **told)
+        speed -= 0.1 * (9.81 - force)
+        height += 0.1 * speed
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert height > 80.0 - 2.0 * last
+
+
+@pytest.mark.parametrize("dropped", [0.5, 0.7, 0.9])
+def test_what_is_dropped_and_caught_flies_on(dropped: float) -> None:
+    """As it is thrown, or launched from another: 1.5 g catch it."""
+    story, height, speed = aloft(), 80.0, 0.0
+    begun = story.t
+    while speed < 0.0 or story.t <= begun + dropped:
+        force = 0.5 if story.t < begun + dropped else 14.7
+        speed -= 0.1 * (9.81 - force)
+        height += 0.1 * speed
+        told = {"height": height, "vertical_speed": speed, "acceleration": force}
+        story.fly(story.t + 0.1, every=0.1, **told)
+    story.fly(story.t + 3.0, height=height)
+    assert story.fired() == []
+
+
 ANEW = {"reboot_count": 1, "rebooted_in_flight": True, "height": 0.0}
 RESTS: dict[str, Any] = {"vertical_speed": 0.0, "height": 0.0, **DOWN}
 SPEED = {"vertical_speed": -14.0, "height": math.nan}
