@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -142,9 +143,15 @@ def with_rules(
 
 def shipped(name: str, **settings: Any) -> SupervisorConfig:
     """Settings with a profile as it is shipped."""
-    config = SupervisorConfig(**settings)
+    links = SupervisorConfig(**settings).links
+    return SupervisorConfig(profile=_read(name, links), **settings)
+
+
+@functools.cache
+def _read(name: str, links: tuple[str, ...]) -> Profile:
+    """Reading one takes as long as half a second of a story."""
     text = (PROFILES / f"{name}.yaml").read_text(encoding="utf-8")
-    return SupervisorConfig(profile=read_profile(text, name, config.links), **settings)
+    return read_profile(text, name, links)
 
 
 def parachute(

@@ -25,13 +25,14 @@ def aloft(name: str = "multirotor", **settings: Any) -> Story:
 
 
 @pytest.mark.parametrize("pressed", [True, False])
+@pytest.mark.parametrize("power", [1, 2])
 @pytest.mark.parametrize("last", [8.5, 9.0, 9.7, 11.0, 12.0, 13.0, 14.0])
-def test_what_falls_flat_is_deployed(last: float, pressed: bool) -> None:
-    """Given motors that stop, and drag that carries it ever more; PX4's simulator ends at 9.7
-    m/s. Nobody tells what was commanded."""
+def test_what_falls_flat_is_deployed(last: float, power: int, pressed: bool) -> None:
+    """Given motors that stop, and drag that carries it ever more, with its speed (PX4's simulator,
+    9.7 m/s in the end) or the square of it. Nobody tells what was commanded."""
     story, height, speed = aloft(), 80.0, 0.0
     while "DEPLOY" not in story.fired() and height > 20.0:
-        force = 9.81 * (speed / last) ** 2
+        force = 9.81 * abs(speed / last) ** power
         told = {"height": height, "vertical_speed": speed, "acceleration": force}
         if pressed:
             told |= {"pressure": 101_325.0 - 12.0 * height, "pressure_age": 0.0}
@@ -39,7 +40,7 @@ def test_what_falls_flat_is_deployed(last: float, pressed: bool) -> None:
         speed -= 0.1 * (9.81 - force)
         height += 0.1 * speed
     assert story.fired() == ["KILL", "DEPLOY"]
-    assert height > 80.0 - 2.0 * last
+    assert height > 80.0 - 2.2 * last
 
 
 @pytest.mark.parametrize("dropped", [0.5, 0.7, 0.9])
