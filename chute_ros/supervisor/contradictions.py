@@ -166,11 +166,14 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
 
 def felt_drop(motion: tuple[Moment, ...]) -> float:
     """The vertical speed that a fall has given it lately, as its accelerometer felt it, m/s: 0, or
-    negative; NaN: some of that time nothing was told of. Whichever way up it is: no attitude is
-    asked."""
-    if any(after[0] - before[0] > _GAP for before, after in pairwise(motion)):
-        return math.nan
-    return _felt(motion)
+    negative; over a silence by how much its speed is lower after it; NaN: no speed was told there.
+    Whichever way up it is: no attitude is asked."""
+    silent = [
+        min(after[1] - before[1], 0.0)
+        for before, after in pairwise(motion)
+        if after[0] - before[0] > _GAP
+    ]
+    return _felt(motion) + sum(silent)
 
 
 def _felt(motion: tuple[Moment, ...]) -> float:

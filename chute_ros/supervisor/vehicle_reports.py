@@ -231,9 +231,13 @@ def _judged_at_rest(turn: Turn) -> dict[str, str]:
     known = state.measured(ACCELERATION)
     force = known.usable(config.profile.limits[ACCELERATION], now)
     speed, rate = _vertical(turn)
-    moves = abs(speed) > limit or abs(rate) > limit
+    # A receiver may tell no speed, or one of before, where the heights climb.
+    climb = readings.told_rate(config, state, HEIGHT, now)
+    moves = any(abs(one) > limit for one in (speed, rate, climb))
     least, most = _AT_REST
-    if not (moves or math.isnan(force)):
+    # One that is armed may be pushed before it says that it flies.
+    pushed = force > most and flight.armed(config, state, now) is Armed.ARMED
+    if not (moves or pushed or math.isnan(force)):
         judged[ACCELERATION] = "" if least <= force <= most else _no_gravity(force)
     for value, names in ((speed, (VERTICAL_SPEED, HEIGHT)), (rate, (PRESSURE_ALTITUDE,))):
         if _cannot_move(turn, force, value):

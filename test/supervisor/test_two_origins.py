@@ -208,8 +208,12 @@ def test_a_drop_is_felt_whether_it_was_told_as_well_or_not() -> None:
         fell = tuple((t, told * k, f, c) for k, (t, _, f, c) in enumerate(MOMENTS))
         assert felt_drop(fell) == pytest.approx(-GRAVITY, abs=0.1)
     assert felt_drop(tuple((t, v, FREE_FALL, c) for t, v, _, c in MOMENTS)) == 0.0
-    # Nobody knows what was felt in a gap.
-    assert math.isnan(felt_drop((*MOMENTS[:5], *MOMENTS[9:])))
+    # What nobody felt in a gap its speed tells, if it is told.
+    fell = tuple((t, -0.98 * k, f, c) for k, (t, _, f, c) in enumerate(MOMENTS))
+    gap = (*fell[:5], *fell[9:])
+    assert felt_drop(gap) == pytest.approx(-GRAVITY, abs=0.2)
+    assert felt_drop((*MOMENTS[:5], *MOMENTS[9:])) > -7.0, "which hovers on"
+    assert math.isnan(felt_drop(tuple((t, math.nan, f, c) for t, _, f, c in gap)))
     assert felt_drop(()) == 0.0
 
 

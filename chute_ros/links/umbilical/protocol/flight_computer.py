@@ -68,9 +68,9 @@ class FlightComputer:
         #: Its altitude where it stands before the flight, m: it may count from the sea. NaN: it
         #: was not heard there.
         self._ground = NAN
-        #: As it was last heard before a restart in this flight, m: height, and the altitude of
-        #: its pressure, which does not count from anywhere else after it.
-        self._before_restart = NAN, NAN
+        #: The altitude of the pressure there, m, which does not count from anywhere else after a
+        #: restart; and what heights are above since one, NaN: none since it was heard there.
+        self._ground_by_pressure = self._pressure_zero = NAN
         self._was_out = False
         self._canopies = Canopies()
         #: Records in a row that say that the parachute is out.
@@ -102,10 +102,12 @@ class FlightComputer:
             self.restarted_in_flight = self.flying
             # Its altitude may count from elsewhere now.
             self._rest_altitude = NAN
-            if self.flying and self.record is not None:
-                by_pressure = pressure_altitude(self.record.number("pressure"))
-                self._before_restart = self._height(self.record), by_pressure
-            else:
+            if self.record is not None and math.isnan(self._pressure_zero):
+                # Where the ground's is not known its height goes on from what it was.
+                last = _by_pressure(self.record) - self._height(self.record)
+                known = not math.isnan(self._ground_by_pressure)
+                self._pressure_zero = self._ground_by_pressure if known else last
+            if not self.flying:
                 self._ground = NAN
         before, self.record = self.record, record
         self._cable_pulled = False
@@ -121,9 +123,10 @@ class FlightComputer:
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
         if self.mode in GROUND and not self.flying:
-            self._canopies, self._before_restart = Canopies(), (NAN, NAN)
+            self._canopies, self._pressure_zero = Canopies(), NAN
             if self._at_rest or math.isnan(self._ground):
                 self._ground = record.number("altitude")
+                self._ground_by_pressure = _by_pressure(record)
         return self.liveness.heard(now), age
 
     def cable_pulled(self) -> None:
@@ -290,7 +293,7 @@ class FlightComputer:
             uptime=self._clock.uptime,
             reboot_count=self.restarts,
             rebooted_in_flight=self.restarted_in_flight,
-            height_holds=self.restarted_in_flight and not math.isnan(sum(self._before_restart)),
+            height_holds=self.restarted_in_flight and not math.isnan(self._pressure_zero),
         )
 
     # -- inside ----------------------------------------------------------------------------------
@@ -298,9 +301,8 @@ class FlightComputer:
     def _height(self, record: Record) -> float:
         """Above where it took off, m; of one that was first heard in flight its altitude. NaN: not
         known."""
-        height, by_pressure = self._before_restart
-        if not math.isnan(height + by_pressure):
-            return height + pressure_altitude(record.number("pressure")) - by_pressure
+        if not math.isnan(self._pressure_zero):
+            return _by_pressure(record) - self._pressure_zero
         return record.number("altitude") - (0.0 if math.isnan(self._ground) else self._ground)
 
     def _has_restarted(self, record: Record) -> bool:
@@ -396,6 +398,10 @@ class FlightComputer:
 
 def _mode(record: Record) -> FlightMode | None:
     return _MODES.get(int(record["flight_mode"]))
+
+
+def _by_pressure(record: Record) -> float:
+    return pressure_altitude(record.number("pressure"))
 
 
 def _age(age: float, value: float) -> float:

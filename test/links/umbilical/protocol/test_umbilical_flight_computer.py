@@ -337,6 +337,30 @@ def test_a_restart_in_flight_does_not_move_its_height(counts_from):
     assert status(rocket, 9.0).height == seen.height
 
 
+@pytest.mark.parametrize("damaged", [0.0, 900.0])
+def test_after_a_restart_it_lands_at_its_ground_on_a_high_site_as_well(damaged):
+    """Given altitudes that count from the pressure of a pad 1400 m up, which are another scale
+    than the standard atmosphere's, and a last one before the restart that may be damaged."""
+
+    def above(height):
+        pressure = 85600.0 * (1.0 - height / 44_330.0) ** (1.0 / 0.190263)
+        return {"altitude": f"{height:.2f}", "pressure": f"{pressure:.1f}"}
+
+    rocket = Rocket()
+    for step in range(60):
+        rocket.says(step / 10, STANDBY, **above(0.0))
+    rocket.says(7.0, ASCENT, **above(1000.0))
+    rocket.says(8.0, COAST, **{**above(3000.0), "altitude": str(3000.0 + damaged)})
+    rocket.restarts(9.0)
+    for step in range(2):
+        rocket.says(9.0 + step / 10, STARTUP, **{**above(2900.0), "altitude": "0"})
+    for height in (1500.0, 150.0, 0.0):
+        anew = {**above(height), "altitude": str(height - 2900.0)}
+        rocket.says(99.0 - height / 100.0, STARTUP, **anew)
+        seen = vehicle(rocket, 99.0 - height / 100.0)
+        assert seen.height == pytest.approx(height, abs=0.05 * height + 1.0)
+
+
 def test_without_a_pressure_nobody_knows_its_height_after_a_restart():
     rocket = flown((0.0, STANDBY, {"pressure": "NaN"}), (1.0, ASCENT, {"pressure": "NaN"}))
     rocket.restarts(3.0)
