@@ -143,7 +143,7 @@ def test_a_fall_whose_speed_was_not_told_for_a_second_is_no_jump() -> None:
     begun = story.t
     story.fly(begun + 1.0, vertical_speed=math.nan, height=math.nan, acceleration=4.5)
     story.fly(begun + 2.0, vertical_speed=-14.0, height=math.nan, acceleration=4.5)
-    assert story.newest(Action.KILL).rule == "critical sink"
+    assert story.newest(Action.KILL).rule == "falls flat"
     assert story.when(Action.KILL) - begun < 1.6
 
 
