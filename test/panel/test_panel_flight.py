@@ -120,8 +120,13 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
     assert set(words[3:]) <= {"KILLING", "DEPLOYING", "DEPLOYED"}
     # When the operator resets, then it is not released any more, and the record has who did it.
     page.get_by_text("more orders").click()
-    hold(page, "Reset")
-    answered(page, "reset: ")
+    for _ in range(
+        3
+    ):  # a page that a busy machine cut off says so, and that it is to be held again
+        hold(page, "Reset")
+        answered(page, "reset: ")
+        if "safety/reset: " in panel.log():
+            break
     assert "safety/arm: arm=True, triggers=0, by='Anna at 127.0.0.1 (panel)'" in panel.log()
     assert "safety/reset: by='Anna at 127.0.0.1 (panel)'" in panel.log()
     assert fits(page)
