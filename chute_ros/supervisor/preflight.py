@@ -69,15 +69,15 @@ def _faults(evidence: LinkEvidence) -> str:
     # The node repeats a fault with its age of now, and may not name the device; of a device that
     # is silent the status is old.
     told = {kind(reason): reason for reason in evidence.reasons}
-    faults, known = [], set()
-    for name, status in sorted(evidence.devices.items()):
-        for fault in status.faults:
-            named = f"{name} {fault}"
-            now = f"{name} {told.get(kind(fault), fault)}"
-            faults.append(told.get(kind(named), now))
-            known |= {kind(named), kind(fault)}
+    devices = sorted(evidence.devices.items())
+    said = [(name, fault) for name, status in devices for fault in status.faults]
+    faults = [
+        told.get(kind(f"{name} {fault}"), f"{name} {told.get(kind(fault), fault)}")
+        for name, fault in said
+    ]
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
-    faults += [reason for of, reason in told.items() if of not in known]
+    known = {kind(fault) for fault in (*faults, *(fault for _, fault in said))}
+    faults += [reason for reason in evidence.reasons if kind(reason) not in known]
     return f" ({'; '.join(faults)})" if faults else ""
 
 

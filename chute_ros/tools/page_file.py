@@ -29,12 +29,6 @@ SVG = Kind("SVG picture", re.compile(rb"(<\?xml [^>]*>\s*)?<svg "))
 #: A title alone: parameter files begin with a comment of several lines.
 MARKDOWN = Kind("Markdown page", re.compile(rb"# [^\n]+\n\n"))
 JUNIT = Kind("JUnit report", re.compile(rb"(<\?xml [^>]*>\s*)?<testsuite"))
-#: What the kit's recordings say of who wrote them; black boxes are MCAP as well.
-KIT_LIBRARY = "chute_ros conformance"
-KIT_MCAP = Kind(
-    "MCAP recording of conformance",
-    re.compile(rb"\x89MCAP0\r\n\x01.{12}.{4}" + KIT_LIBRARY.encode(), re.DOTALL),
-)
 
 
 def require_output(path: Path, kind: Kind, inputs: Iterable[Path] = ()) -> None:

@@ -149,7 +149,7 @@ def shipped(name: str, **settings: Any) -> SupervisorConfig:
 
 @functools.cache
 def _read(name: str, links: tuple[str, ...]) -> Profile:
-    """Reading one takes as long as half a second of a story."""
+    """Once for all stories."""
     text = (PROFILES / f"{name}.yaml").read_text(encoding="utf-8")
     return read_profile(text, name, links)
 

@@ -430,6 +430,15 @@ def test_an_unhealthy_device_is_told_with_its_faults_if_it_has_any(
     assert block_reasons(CONFIG, state, NOW) == (f"a: its device is not healthy{more}",)
 
 
+def test_what_its_node_repeats_of_a_release_is_told_once_and_all_else_of_it() -> None:
+    device = replace(READY, faults=("hot",), deployed=True)
+    more = ("1 is released", "supply 3.1 V", "supply 3.2 V")
+    evidence = replace(link(device, healthy=False), reasons=more)
+    assert block_reasons(CONFIG, known(a=evidence), NOW) == (
+        "a: its device is not healthy (1 hot; 1 is released; supply 3.1 V; supply 3.2 V)",
+    )
+
+
 @pytest.mark.parametrize(
     ("told", "words"),
     [

@@ -35,11 +35,10 @@ from chute_ros.ros.own_version import own_version
 from chute_ros.sim.command_line import real
 from chute_ros.tools.conformance.page import page
 from chute_ros.tools.conformance.report import Report
-from chute_ros.tools.conformance.traffic import recording
+from chute_ros.tools.conformance.traffic import MCAP, recording
 from chute_ros.tools.page_file import (
     HTML,
     JUNIT,
-    KIT_MCAP,
     require_output,
     write_output,
     write_page,
@@ -133,7 +132,7 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
     bench, wire = kit.bench(chosen, risk), kit.wire(chosen)
     given = {f"--{name.replace('_', '-')}" for name, value in vars(chosen).items() if value}
     # A long run must not end with a report that cannot be written.
-    for path, kind in ((chosen.html, HTML), (chosen.junit, JUNIT), (chosen.mcap, KIT_MCAP)):
+    for path, kind in ((chosen.html, HTML), (chosen.junit, JUNIT), (chosen.mcap, MCAP)):
         if path is not None:
             require_output(path, kind)
     if chosen.junit:
@@ -275,7 +274,7 @@ def _write(chosen: argparse.Namespace, report: Report) -> None:
     writers: list[tuple[Path | None, Callable[[Path], object]]] = [
         (chosen.html, lambda path: write_page(path, page(report), HTML)),
         (chosen.junit, lambda path: write_page(path, _junit()(report), JUNIT)),
-        (chosen.mcap, lambda path: write_output(path, recording(report), KIT_MCAP)),
+        (chosen.mcap, lambda path: write_output(path, recording(report), MCAP)),
     ]
     for path, write in writers:
         if path is not None:

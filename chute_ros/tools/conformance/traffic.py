@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import io
 import json
+import re
 
 from mcap.writer import Writer
 
 from chute_ros.tools.conformance.report import Report
-from chute_ros.tools.page_file import KIT_LIBRARY
+from chute_ros.tools.page_file import Kind
 
 _NANOSECONDS = 1e9
+#: Who wrote it, as it says itself: black boxes are MCAP as well. Magic, then the header's kind and
+#: length, an empty profile, and the length of this.
+_LIBRARY = "chute_ros conformance"
+MCAP = Kind(
+    "MCAP recording of conformance",
+    re.compile(rb"\x89MCAP0\r\n\x01.{8}\0{4}.{4}" + _LIBRARY.encode(), re.DOTALL),
+)
 #: The content of each message, for Foxglove and the like.
 _SCHEMA = {
     "type": "object",
@@ -28,7 +36,7 @@ def recording(report: Report) -> bytes:
     """All traffic, a message a packet, and the report's head as metadata."""
     file = io.BytesIO()
     writer = Writer(file)
-    writer.start(profile="", library=KIT_LIBRARY)
+    writer.start(profile="", library=_LIBRARY)
     schema = writer.register_schema("chute_ros.Packet", "jsonschema", json.dumps(_SCHEMA).encode())
     channel = writer.register_channel("traffic", "json", schema)
     for number, one in enumerate(report.traffic):
