@@ -5,6 +5,7 @@ Needs the environment sourced after a build: make test-long.
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import os
 import subprocess
@@ -50,6 +51,7 @@ def rows(result: ET.Element) -> list[tuple[str, str, float]]:
 
 def main() -> int:
     """Run them; the code to exit with."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "long.xml"
         command = [sys.executable, "-m", "pytest", "-m", "long", "-p", "no:cacheprovider"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -36,6 +37,8 @@ def main() -> None:
     chosen = _options().parse_args()
     every = stories.every()
     if chosen.list:
+        # A reader that has enough (head) is no fault.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         for one in every.values():
             print(f"{one.name:16s} {one.text} ({', '.join(one.kinds)})")
         return

@@ -303,10 +303,10 @@ def _restart(bench: UpfBench) -> Trial:
     yield from bench.watch_on(0.5)
     yield Wait(bench.now + _LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
-    if bench.starts == starts:
-        raise failed("uptime_sec does not begin anew", bench.packets(NODE_STATUS)[:2])
     if not is_up:
         raise failed(f"it is not {up} within {READY_WITHIN:g} s")
+    if bench.starts == starts:
+        raise failed("uptime_sec does not begin anew", bench.packets(NODE_STATUS)[:2])
     return f"it starts anew, and is {up}"
 
 
