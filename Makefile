@@ -85,14 +85,14 @@ test: build .venv-case/done ## lint, trace the requirements, test both packages,
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
 
 test-long: build ## run the tests that are long by nature, write docs/evidence/long_tests.md
-	@$(OVERLAY) && $(LOCAL) && exec python3 scripts/test_long.py
+	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && exec python3 scripts/test_long.py
 
 bench: build ## measure against bare scripts, write docs/evidence/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
 
 pictures: build ## fly the tutorial in a browser, keep its pictures in docs/guide/pictures
 	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && CHUTE_PICTURES=docs/guide/pictures exec python3 -m pytest \
-	    -q -p no:cacheprovider test/panel -k "tutorial or twenty or phone or two_parachutes or rocket_from"
+	    -q -p no:cacheprovider -m "long or not long" test/panel -k "tutorial or twenty or phone or two_parachutes or rocket_from"
 
 newcomer: build ## from git clone to a parachute released on the page, in a new folder; write docs/evidence/newcomer.md
 	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && PYTHONPATH="$$PWD/test/panel:$$PYTHONPATH" \

@@ -132,6 +132,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
     assert fits(page)
 
 
+@pytest.mark.long
 def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     # Given a page that waits for its vehicle, when that starts, then it is seen from its start on.
@@ -182,6 +183,7 @@ def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, start_panel, open_pag
     assert not {"KILLING", "DEPLOYING", "DEPLOYED", "FAULT"} & {*words}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hangar", ["both"], indirect=True)
 def test_a_vehicle_whose_parachutes_are_lost_in_flight_is_not_guarded(
     rig, pilot, start_panel, open_page
@@ -251,6 +253,7 @@ def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_pat
     expect(page.locator(".part-decisions")).to_contain_text("the motor burns")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hangar", ["both"], indirect=True)
 def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))

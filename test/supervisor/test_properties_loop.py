@@ -192,7 +192,7 @@ def test_a_deploy_gets_through_once_the_wires_heal_and_the_motors_are_stopped(
     acted = {link: [action for _, action in node.acted] for link, node in loop.nodes.items()}
     assert K in acted[LINK]
     assert any(D in actions for actions in acted.values())
-    loop.run(START + 30.0)
+    loop.run(START + 15.0)
     assert all(number in loop.answers for number in range(10, 10 + len(kills)))
 
 

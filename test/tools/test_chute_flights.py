@@ -176,6 +176,7 @@ def test_a_drone_is_brought_down_by_deploy_and_reset_after_the_landing(rig, term
     terminal.sees_state("READY")
 
 
+@pytest.mark.long
 def test_a_kill_stops_the_motors_and_releases_the_parachute(rig, terminal, pilot):
     take_off(terminal, pilot)
     terminal.orders("kill", "--yes", "--reason", "smoke")
@@ -186,6 +187,7 @@ def test_a_kill_stops_the_motors_and_releases_the_parachute(rig, terminal, pilot
     assert actions.index("KILL") < actions.index("DEPLOY")
 
 
+@pytest.mark.long
 def test_without_a_parachute_in_reach_the_motors_stop_and_that_was_said(rig, terminal, pilot):
     take_off(terminal, pilot)
     rig.processes.send_signal("parachute", signal.SIGSTOP)
@@ -202,6 +204,7 @@ def test_without_a_parachute_in_reach_the_motors_stop_and_that_was_said(rig, ter
     terminal.sees(of_vehicle("armed", "DISARMED"), "the motors are off")
 
 
+@pytest.mark.long
 def test_an_armed_parachute_is_told_in_every_state_on_the_ground(rig, terminal, await_until):
     """Given one that is armed, when its cable is out for a while: it never is READY."""
     terminal.sees_state("READY")
@@ -221,6 +224,7 @@ def test_an_armed_parachute_is_told_in_every_state_on_the_ground(rig, terminal, 
     terminal.sees_state("READY")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rig", ["both"], indirect=True)
 def test_a_drone_with_both_parachutes(rig, terminal, pilot):
     terminal.sees_state("READY")

@@ -145,7 +145,7 @@ def tutorial():
     return [row[1:] for row in rows]
 
 
-@pytest.mark.xdist_group("played flight")
+@pytest.mark.long
 def test_the_tutorial_is_flown_by_services_alone_as_it_is_told(start, bench):  # noqa: F811
     simulation = start()
     player = Player(bench)
