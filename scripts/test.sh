@@ -5,6 +5,8 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 name=$CHUTE_ROS_ENV
 unset MAKEFLAGS MAKELEVEL MFLAGS
+# Hundreds of processes start: each would compile all that it imports.
+unset PYTHONDONTWRITEBYTECODE
 
 # Two runs in one clone would overwrite each other's results. Processes left over by a test must
 # not hold the lock, hence 9>&- below.
