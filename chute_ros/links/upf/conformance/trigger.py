@@ -26,7 +26,8 @@ BROADCAST = "--broadcast"
 SHARED = (
     *("node-status", "node-mode", "uptime", "node-info", "transport-stats", "parameter-list"),
     *("parameter-unknown", "opcode-save", "restart-magic", "restart", "time-sync", "soak"),
-    *("other-node", "dna", "dna-forgets"),
+    *("other-node", "dna", "dna-forgets", "lost-frame", "reordered-frames", "doubled-frames"),
+    *("cut-transfer", "wrong-crc", "foreign-frames"),
 )
 _EVERY = "every trigger on the bus"
 

@@ -16,7 +16,7 @@ from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings, UpfNode
-from chute_ros.links.upf.simulator.spoilt import SpoiltRequests
+from chute_ros.links.upf.simulator.spoilt import WIRE_BREAKS, SpoiltRequests
 from chute_ros.links.upf.simulator.trigger import (
     STATUS_INTERVAL,
     TRIGGER_PARAMETERS,
@@ -54,10 +54,14 @@ _NOT_ASKED = {
 
 
 class BrokenNode(UpfNode):
-    """Wrong as a node on the bus. breaks: the name of a clause of a controller."""
+    """Wrong as a node on the bus. breaks: the name of a clause, of a trigger without trigger-."""
 
-    breaks = ""
     _first_start, _dumb_until = math.nan, -math.inf
+
+    def __init__(self, definitions: Definitions, settings: Any, breaks: str) -> None:
+        self.breaks = breaks
+        super().__init__(definitions, settings)
+        self._spoilt = SpoiltRequests(definitions.types)
 
     @property
     def up(self) -> float:
@@ -85,6 +89,16 @@ class BrokenNode(UpfNode):
             self._dumb_until = now + _STANDS_STILL
         if self.breaks == "dna" and asked and self.node_id:
             self.endpoint.node_id -= 1
+        if self.breaks in WIRE_BREAKS and self._spoilt.observe(data, self.node_id) == self.breaks:
+            self._is_wrong_about_it(now)
+
+    def _is_wrong_about_it(self, now: float) -> None:
+        """It carries out what has a wrong CRC; all else makes it silent for a while."""
+        if self.breaks == "wrong-crc":
+            for frame in self._spoilt.mended():
+                super().receive(pack(frame), now)
+        else:
+            self._dumb_until = now + _STUNNED
 
     def _as_its_own(self, data: bytes) -> bytes:
         """A request to another node, as if it were for this one."""
@@ -110,25 +124,10 @@ class BrokenController(BrokenNode, UpfController):
     def __init__(
         self, definitions: Definitions, settings: ControllerSettings, breaks: str
     ) -> None:
-        self.breaks = breaks
-        super().__init__(definitions, settings)
+        super().__init__(definitions, settings, breaks)
         self._ready_since = math.nan
-        self._spoilt = SpoiltRequests(definitions.types)
         if change := _NODE_CHANGES.get(breaks) or _CONTROLLER_CHANGES.get(breaks):
             change(self)
-
-    def receive(self, data: bytes, now: float) -> None:
-        super().receive(data, now)
-        if self.breaks and self._spoilt.observe(data) == self.breaks:
-            self._is_wrong_about_it(now)
-
-    def _is_wrong_about_it(self, now: float) -> None:
-        """It carries out what has a wrong CRC; all else makes it silent for a while."""
-        if self.breaks == "wrong-crc":
-            for frame in self._spoilt.mended():
-                super().receive(pack(frame), now)
-        else:
-            self._dumb_until = now + _STUNNED
 
     def step(self, now: float) -> None:
         super().step(now)
@@ -172,8 +171,7 @@ class BrokenTrigger(BrokenNode, UpfTrigger):
     """clause: its name."""
 
     def __init__(self, definitions: Definitions, settings: NodeSettings, clause: str) -> None:
-        self.breaks = clause.removeprefix(_TRIGGER)
-        super().__init__(definitions, settings)
+        super().__init__(definitions, settings, clause.removeprefix(_TRIGGER))
         if change := _NODE_CHANGES.get(self.breaks) or _TRIGGER_CHANGES.get(clause):
             change(self)
 
@@ -400,7 +398,7 @@ _TRIGGER_CHANGES: dict[str, Callable[[BrokenTrigger], None]] = {
     "trigger-is-launched": _tells(names.TRIGGER_STATUS, is_launched=False),
 }
 #: Breaks of any node that have no entry above.
-_NODE_BREAKS = ("time-sync", "soak", "other-node", "dna", "dna-forgets")
+_NODE_BREAKS = ("time-sync", "soak", "other-node", "dna", "dna-forgets", *WIRE_BREAKS)
 #: Clauses that a device can break.
 BREAKS = (
     *_NODE_CHANGES,
@@ -410,8 +408,6 @@ BREAKS = (
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
     *("unknown-type", "no-auto-takeoff", "arm-order", "disabled", "deploy", "touchdown"),
-    *("lost-frame", "reordered-frames", "doubled-frames"),
-    *("cut-transfer", "wrong-crc", "foreign-frames"),
     *(f"{_TRIGGER}{name}" for name in (*_NODE_CHANGES, *_NODE_BREAKS, "node-id")),
     *_TRIGGER_CHANGES,
 )

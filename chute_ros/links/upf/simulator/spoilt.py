@@ -1,4 +1,4 @@
-"""What is wrong with the frames of a request: for a controller that is wrong about one of it."""
+"""What is wrong with the frames of a request: for a node that is wrong about one of it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,12 @@ from itertools import pairwise
 from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.transfer import END, START, TOGGLE, Kind, frames_of, head_of
+
+#: The names of the clauses.
+WIRE_BREAKS = (
+    *("lost-frame", "reordered-frames", "doubled-frames"),
+    *("cut-transfer", "wrong-crc", "foreign-frames"),
+)
 
 
 class SpoiltRequests:
@@ -19,8 +25,9 @@ class SpoiltRequests:
         self._frames: list[CanFrame] = []
         self._ended: list[CanFrame] = []
 
-    def observe(self, data: bytes) -> str:
-        """What is wrong with what this frame ends, by the name of its clause; empty: nothing."""
+    def observe(self, data: bytes, node: int) -> str:
+        """What is wrong with what this frame ends, by the name of its clause; empty: nothing, or
+        it is a request to another node."""
         frame = unpack(data)
         if frame is None or not frame.extended or not frame.data:
             return "foreign-frames"
@@ -28,7 +35,8 @@ class SpoiltRequests:
         if head.kind is Kind.MESSAGE:
             known = self._types.by_id(head.type_id, head.kind.value)
             return "" if known else "foreign-frames"
-        return self._follow(frame, frame.data[-1]) if head.kind is Kind.REQUEST else ""
+        to_it = head.kind is Kind.REQUEST and head.destination == node
+        return self._follow(frame, frame.data[-1]) if to_it else ""
 
     def mended(self) -> list[CanFrame]:
         """The frames of the last request of several, with the right CRC."""
