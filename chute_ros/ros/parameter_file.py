@@ -75,14 +75,31 @@ def assigned(arguments: Sequence[str]) -> Iterator[tuple[str, str, str]]:
         yield one, node, parameter
 
 
+def renamed(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Each -r among the arguments of a process: it, and the name that is to be another."""
+    for one in _options(arguments, "-r", "--remap"):
+        yield one, one.partition(":=")[0].rpartition(":")[2]
+
+
+def not_for_ros(arguments: Sequence[str]) -> list[str]:
+    """The arguments of a process that are not between --ros-args and --. ROS takes NAME:=VALUE
+    there for a name that is to be another."""
+    return [one for _, one, ours in _each(arguments) if not ours]
+
+
 def _options(arguments: Sequence[str], *flags: str) -> Iterator[str]:
     """What follows these flags where arguments are ROS's."""
+    return (one for before, one, ours in _each(arguments) if ours and before in flags)
+
+
+def _each(arguments: Sequence[str]) -> Iterator[tuple[str, str, bool]]:
+    """The argument before it, it, and whether it is ROS's."""
     ours = False
     for before, one in zip(("", *arguments), arguments, strict=False):
         if one in ("--ros-args", "--"):
             ours = one == "--ros-args"
-        elif ours and before in flags:
-            yield one
+        else:
+            yield before, one, ours
 
 
 def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iterable[str]) -> str:

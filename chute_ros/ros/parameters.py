@@ -19,7 +19,14 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 
 from chute_ros.errors import ParameterError
-from chute_ros.ros.parameter_file import assigned, files_of, named_in, of_every_node, taken
+from chute_ros.ros.parameter_file import (
+    assigned,
+    files_of,
+    named_in,
+    of_every_node,
+    renamed,
+    taken,
+)
 from chute_ros.settings import Parameter
 
 
@@ -85,6 +92,9 @@ def settings_taken(node: Node, names: Iterable[str], arguments: Sequence[str]) -
                 f"'-p {one}' is for a node /{other}, this one is {own}: leave '{other}:' out"
             )
         check_names([name], known, f"'-p {one}': {own}")
+    for one, name in renamed(arguments):
+        if name in known:
+            raise ParameterError(f"'-r {one}' gives topics another name: {name} is set by '-p'")
     for path in files_of(arguments):
         check_names(named_in(path, own), known, f"{path}: {own}")
     return text

@@ -70,6 +70,20 @@ def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
     assert words in line
 
 
+def test_a_setting_that_ros_would_take_for_a_new_name_of_topics_is_told() -> None:
+    code, (line,) = start("safety_supervisor", "-r", "mode:=SHADOW")
+    assert (code, line) == (
+        2,
+        "safety_supervisor: '-r mode:=SHADOW' gives topics another name: mode is set by '-p'",
+    )
+    code, (line, usage) = start("safety_supervisor", "--", "mode:=SHADOW")
+    assert code == 2
+    assert line == (
+        "safety_supervisor: unknown argument mode:=SHADOW: the settings of a node follow --ros-args"
+    )
+    assert "[-p PARAMETER:=VALUE]" in usage
+
+
 def test_a_name_without_its_namespace_is_told_with_the_fix(tmp_path: Path) -> None:
     path = tmp_path / "settings.yaml"
     path.write_text(ROOTED)
