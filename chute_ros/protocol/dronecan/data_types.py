@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import struct
+from binascii import crc_hqx
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from dronecan.dsdl import common, parser
+from dronecan.dsdl import parser
 from dronecan.transport import (
     ArrayValue,
     BaseValue,
@@ -37,7 +38,7 @@ class DataType:
         self.is_service = dsdl_type.kind == parser.CompoundType.KIND_SERVICE
         signature = struct.pack("<Q", dsdl_type.get_data_type_signature())
         #: Start of the CRC of a transfer with several frames.
-        self.base_crc: int = common.crc16_from_bytes(signature)
+        self.base_crc: int = crc_hqx(signature, 0xFFFF)
         self._type, self._mode = dsdl_type, mode
         if mode == "request":
             fields, constants = dsdl_type.request_fields, dsdl_type.request_constants
@@ -50,6 +51,14 @@ class DataType:
             field.name for field in fields if field.type.category != field.type.CATEGORY_VOID
         )
         self.constants: dict[str, Any] = {one.name: one.value for one in constants}
+        self._named: dict[str, dict[Any, str]] = {}
+
+    def named(self, prefix: str) -> Mapping[Any, str]:
+        """Value -> the first constant that has it, of those with this prefix."""
+        if prefix not in self._named:
+            some = [name for name in self.constants if name.startswith(prefix)]
+            self._named[prefix] = {self.constants[name]: name for name in reversed(some)}
+        return self._named[prefix]
 
     def encode(self, values: Values) -> bytes:
         """The payload; fields that are not given are 0. MessageError for a value or name that

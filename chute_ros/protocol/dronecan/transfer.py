@@ -7,10 +7,9 @@ it is counted under its reason, and dropped with the transfer that it belongs to
 from __future__ import annotations
 
 import enum
+from binascii import crc_hqx
 from collections import Counter, OrderedDict, deque
-from dataclasses import dataclass, field, replace
-
-from dronecan.dsdl import common
+from dataclasses import dataclass, field
 
 from chute_ros.errors import MessageError
 from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
@@ -69,7 +68,7 @@ def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list
     if len(payload) > _FRAME_PAYLOAD:
         if transfer.source == 0:
             raise MessageError(f"{len(payload)} bytes: an anonymous transfer has one frame")
-        crc = common.crc16_from_bytes(payload, initial=base_crc)
+        crc = crc_hqx(payload, base_crc)
         payload = bytes((crc & 0xFF, crc >> 8)) + payload
     identifier = _identifier(transfer, discriminator)
     frames, toggle = [], 0
@@ -108,18 +107,18 @@ def _identifier(transfer: Transfer, discriminator: int) -> int:
     return common_part | transfer.type_id << 8
 
 
-def head_of(frame: CanFrame) -> Transfer:
-    """All of a transfer that a frame of it says with its identifier and its tail byte, with an
-    empty payload."""
+def head_of(frame: CanFrame, payload: bytes = b"") -> Transfer:
+    """All of a transfer that a frame of it says with its identifier and its tail byte, with this
+    payload."""
     identifier = frame.identifier
     priority, source = identifier >> 24 & 0x1F, identifier & 0x7F
     transfer_id = frame.data[-1] % TRANSFER_IDS
     if identifier & 0x80:
         kind = Kind.REQUEST if identifier & 0x8000 else Kind.RESPONSE
         type_id, destination = identifier >> 16 & 0xFF, identifier >> 8 & 0x7F
-        return Transfer(kind, type_id, source, destination, transfer_id, b"", priority)
+        return Transfer(kind, type_id, source, destination, transfer_id, payload, priority)
     type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
-    return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, b"", priority)
+    return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, payload, priority)
 
 
 @dataclass
@@ -186,7 +185,7 @@ class Assembler:
         if head.source == 0:
             if frame.data[-1] & (START | END | TOGGLE) != START | END:
                 return self._drop("anonymous transfers of more than one frame")
-            return replace(head, payload=frame.data[:-1])
+            return head_of(frame, frame.data[:-1])
         return self._next(head, frame, now)
 
     def _next(self, head: Transfer, frame: CanFrame, now: float) -> Transfer | None:
@@ -218,7 +217,7 @@ class Assembler:
                 session.payload = None
                 session.done.append((head.transfer_id, now))
                 session.said = chunk
-                return replace(head, payload=chunk)
+                return head_of(frame, chunk)
             session.crc = chunk[0] | chunk[1] << 8
             session.payload = bytearray(chunk[2:])
             return None
@@ -238,12 +237,12 @@ class Assembler:
         payload, session.payload = bytes(session.payload), None
         data_type = self._types.by_id(head.type_id, head.kind.value)
         assert data_type is not None  # feed has looked
-        if common.crc16_from_bytes(payload, initial=data_type.base_crc) != session.crc:
+        if crc_hqx(payload, data_type.base_crc) != session.crc:
             # It may be sent again under the same number.
             return self._drop("CRC of a transfer wrong (or another definition of its type)")
         session.done.append((head.transfer_id, now))
         session.said = b""
-        return replace(head, payload=payload)
+        return head_of(frame, payload)
 
     def _drop(self, reason: str) -> Transfer | None:
         self._counts[reason] += 1

@@ -167,10 +167,10 @@ class Definitions:
 
     def type_name(self, service: str, values: Mapping[str, Any]) -> str:
         """The name of a request's type, by its number; empty: none, or the magic number is bad."""
-        constants = self.types.request(service).constants
-        if values["magic_number"] != constants[MAGIC]:
+        kind = self.types.request(service)
+        if values["magic_number"] != kind.constants[MAGIC]:
             return ""
-        return _named(constants, "TYPE_", values["type"])
+        return _named(kind, "TYPE_", values["type"])
 
     def magic_is_good(self, service: str, values: Mapping[str, Any]) -> bool:
         """A request carries the magic number of its type."""
@@ -179,13 +179,13 @@ class Definitions:
     def result_name(self, service: str, values: Mapping[str, Any]) -> str:
         """The name of a response's result without RESULT_, or "result N"."""
         number = values["result"]
-        name = _named(self.types.response(service).constants, _RESULT, number)
+        name = _named(self.types.response(service), _RESULT, number)
         return name.removeprefix(_RESULT) or f"result {number}"
 
     def state_name(self, name: str, values: Mapping[str, Any]) -> str:
         """The name of the state in a message without STATE_; empty: not told, or no name."""
-        constants = self.types.message(name).constants
-        return _named(constants, "STATE_", values.get("state")).removeprefix("STATE_")
+        kind = self.types.message(name)
+        return _named(kind, "STATE_", values.get("state")).removeprefix("STATE_")
 
     def faults(self, name: str, values: Mapping[str, Any]) -> list[str]:
         """Every fault that a status message tells, in words.
@@ -199,7 +199,7 @@ class Definitions:
         if isinstance(flags, int):
             for bit in (1 << n for n in range(flags.bit_length())):
                 if flags & bit:
-                    named = _named(kind.constants, _ERROR, bit).removeprefix(_ERROR)
+                    named = _named(kind, _ERROR, bit).removeprefix(_ERROR)
                     found.append(named or f"error bit {bit.bit_length() - 1}")
         for field, value in values.items():
             word = field.lower()
@@ -209,7 +209,6 @@ class Definitions:
         return found
 
 
-def _named(constants: Mapping[str, Any], prefix: str, number: Any) -> str:
-    """The constant with this prefix and value; empty: none."""
-    matching = (n for n, value in constants.items() if n.startswith(prefix) and value == number)
-    return next(matching, "")
+def _named(kind: DataType, prefix: str, number: Any) -> str:
+    """The constant with this prefix and value; empty: none. number: whatever the types have."""
+    return kind.named(prefix).get(number, "") if isinstance(number, (int, float)) else ""
