@@ -27,6 +27,24 @@ class HeardPacket:
 HeardT = TypeVar("HeardT", bound=HeardPacket)
 
 
+def first_of(
+    heard: Sequence[HeardT], since: int, fits: Callable[[HeardT], bool]
+) -> Callable[[], HeardT | None]:
+    """What returns the first one from this place of heard on that fits; None: it has not come.
+    Each is looked at once, however often this is asked."""
+    place, first = since, None
+
+    def found() -> HeardT | None:
+        nonlocal place, first
+        while first is None and place < len(heard):
+            one = heard[place]
+            place += 1
+            first = one if fits(one) else None
+        return first
+
+    return found
+
+
 class RecordingBench(Generic[HeardT]):
     """heard: of the device, in their order; watched: what the last watch saw. risk: the highest
     that the person allows."""
@@ -90,12 +108,7 @@ class RecordingBench(Generic[HeardT]):
         self, kind: str, within: float, fits: Callable[[HeardT], bool] = lambda one: True
     ) -> Any:
         """The next message of this kind from the device that fits; None: none came within (s)."""
-        since = len(self.heard)
-
-        def found() -> HeardT | None:
-            every = (one for one in self.heard[since:] if one.kind == kind and fits(one))
-            return next(every, None)
-
+        found = first_of(self.heard, len(self.heard), lambda one: one.kind == kind and fits(one))
         yield Wait(self.now + within, found)
         return found()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from argparse import ArgumentParser, Namespace
 
 from chute_ros.conformance.clause import Risk
@@ -11,6 +12,7 @@ from chute_ros.links.umbilical.conformance.bench import UmbilicalBench
 from chute_ros.links.umbilical.conformance.document import DOCUMENT
 from chute_ros.links.umbilical.conformance.permits import REBOOT, WIPE
 from chute_ros.links.umbilical.layout_files import add_layout_options, chosen_layout, load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.broken import simulated_computer
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
@@ -38,9 +40,14 @@ def _wire(chosen: Namespace) -> Wire:
     return make_wire(parse_serial_address(chosen.connection))
 
 
+@functools.cache
+def _reference() -> Layout:
+    return load_layouts("", "the layouts")[0]
+
+
 def _simulated(broken: str, needs: str) -> tuple[FlightComputer, UmbilicalBench]:
     """With the layout of the reference."""
-    layout = load_layouts("", "the layouts")[0]
+    layout = _reference()
     device = simulated_computer(FlightComputerSettings(), layout, [], broken)
     return device, UmbilicalBench(layout, Risk.FIRES, (needs,), _SOAK)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from argparse import ArgumentParser, Namespace
 
 from chute_ros.conformance.clause import Risk
@@ -82,9 +83,14 @@ def _wire(chosen: Namespace) -> Wire:
     return make_can_wire(parse_can_address(chosen.connection, chosen.bitrate))
 
 
+@functools.cache
+def _ours() -> Definitions:
+    return Definitions(load_data_types("", ""))
+
+
 def _simulated(broken: str, needs: str) -> tuple[UpfBus, UpfBench]:
     """A trigger alone, or with a controller that is tried, at rest on a bench."""
-    definitions = Definitions(load_data_types("", ""))
+    definitions = _ours()
     controller = simulated_controller(definitions, ControllerSettings(), broken)
     trigger = simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)
     alone = TRIGGER in needs

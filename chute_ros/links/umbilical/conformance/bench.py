@@ -10,7 +10,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, RecordingBench
+from chute_ros.conformance.bench import HeardPacket, RecordingBench, first_of
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.conformance.permits import check_options, risk_of
@@ -230,8 +230,9 @@ class UmbilicalBench(RecordingBench[HeardLine]):
 
     def find(self) -> Trial:
         """What sends $TELEM, by its layout."""
-        began = self.now
-        yield Wait(began + _FOUND_WITHIN, lambda: any(one.kind == TELEM for one in self.heard))
+        yield Wait(
+            self.now + _FOUND_WITHIN, first_of(self.heard, 0, lambda one: one.kind == TELEM)
+        )
         lines = [one for one in self.heard if one.kind == TELEM]
         if not lines:
             count = sum(len(one.raw) for one in self.traffic if not one.sent)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench
+from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench, first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
@@ -206,18 +206,15 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self._spoilt += [*whole, *spoils(self._endpoint.take_output())]
 
     def _response(self, server: int, service: str, number: int) -> Any:
-        since = len(self.every)
+        def answers(one: HeardTransfer) -> bool:
+            heard = one.transfer
+            told = heard.kind, heard.source, heard.name, heard.transfer_id
+            return told == (Kind.RESPONSE, server, service, number)
 
-        def found() -> Mapping[str, Any] | None:
-            for one in self.every[since:]:
-                heard = one.transfer
-                answers = heard.kind, heard.source, heard.name, heard.transfer_id
-                if answers == (Kind.RESPONSE, server, service, number):
-                    return heard.values
-            return None
-
-        yield Wait(self.now + ANSWER, lambda: found() is not None)
-        return found()
+        found = first_of(self.every, len(self.every), answers)
+        yield Wait(self.now + ANSWER, found)
+        answer = found()
+        return None if answer is None else answer.values
 
     def _check(self, service: str, values: Mapping[str, Any]) -> None:
         """Nothing leaves that is not allowed."""
@@ -249,13 +246,9 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def find(self) -> Trial:
         """Who tells the state of such a device."""
-        began = self.now
-
-        def found() -> int:
-            return next((one for one in self._tellers(0) if self._wanted in (0, one)), 0)
-
-        yield Wait(began + _FOUND_WITHIN, found)
-        self.node = self._home = found()
+        found = self._teller(0, lambda node: self._wanted in (0, node))
+        yield Wait(self.now + _FOUND_WITHIN, found)
+        self.node = self._home = _node_of(found())
         self._ids.add(self.node)
         if not self.node:
             others = sorted({one.transfer.source for one in self.every})
@@ -274,14 +267,20 @@ class UpfBench(RecordingBench[HeardTransfer]):
         """The message that tells its state, in a word."""
         return self.device.status.rpartition(".")[2]
 
-    def _tellers(self, since: int) -> Iterator[int]:
-        """Who has told the state of such a device, from this place of every on."""
-        told = (one for one in self.every[since:] if one.kind == self.device.status)
-        return (one.transfer.source for one in told)
+    def _teller(
+        self, since: int, fits: Callable[[int], bool]
+    ) -> Callable[[], HeardTransfer | None]:
+        """The first that tells the state of such a device, from this place of every on, of a node
+        that fits."""
+        status = self.device.status
+        return first_of(
+            self.every, since, lambda one: one.kind == status and fits(one.transfer.source)
+        )
 
     def others(self) -> set[int]:
         """The nodes of other devices of its kind."""
-        return set(self._tellers(0)) - self._ids
+        told = (one for one in self.every if one.kind == self.device.status)
+        return {one.transfer.source for one in told} - self._ids
 
     def nobody(self) -> int:
         """A node id that nobody on the bus has."""
@@ -395,18 +394,14 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def comes_back(self, within: float) -> Any:
         """Whether it tells its state within so many s, under its new node id."""
-        since = len(self.every)
         # Another one on this bus is not the one that was sent away.
         others = self.others()
-
-        def found() -> int:
-            return next((one for one in self._tellers(since) if one not in others), 0)
-
+        found = self._teller(len(self.every), lambda node: node not in others)
         self.gives_out = True
         yield Wait(self.now + within, found)
-        self.node = found() or self.node
+        self.node = _node_of(found()) or self.node
         self._ids.add(self.node)
-        return bool(found())
+        return found() is not None
 
     def static_again(self) -> Any:
         """Whether it is under its own node id again, with the static node id that it had."""
@@ -440,3 +435,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
         if self.device.up:
             return (yield from self.reaches(ParachuteState[self.device.up], within))
         return (yield from self.wait_for(self.device.status, within)) is not None
+
+
+def _node_of(one: HeardTransfer | None) -> int:
+    """Who sent it; 0: nobody."""
+    return 0 if one is None else one.transfer.source

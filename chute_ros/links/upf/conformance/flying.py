@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
+from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
 from chute_ros.links.upf.conformance.bench import HeardTransfer, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
@@ -175,9 +177,7 @@ def _deploy(bench: UpfBench) -> Trial:
     if result != "SUCCESS":
         raise failed(f"ARMED, and TYPE_DEPLOY: {result or 'not answered'}")
 
-    def out() -> bool:
-        return any(_tells_launched(bench, one) for one in bench.every[bench.deployed_from :])
-
+    out = first_of(bench.every, bench.deployed_from, partial(_tells_launched, bench))
     yield Wait(began + FIRES_WITHIN, out)
     if not out():
         bench.deployed_from = -1

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import DNA, UpfBench
+from chute_ros.links.upf.conformance.bench import DNA, HeardTransfer, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
@@ -54,16 +55,15 @@ def _forgets(bench: UpfBench) -> Trial:
     bench.gives_out = False
     yield from bench.save_and_restart()
 
-    def asked() -> bool:
-        every = (one for one in bench.every[since:] if one.kind == ALLOCATION)
-        return any(unique_id.startswith(bytes(one.values["unique_id"])) for one in every)
+    def asks(one: HeardTransfer) -> bool:
+        return one.kind == ALLOCATION and unique_id.startswith(bytes(one.values["unique_id"]))
 
+    asked = first_of(bench.every, since, asks)
     yield Wait(bench.now + _ASKS_WITHIN, asked)
     bench.gives_out = True
-    asks = asked()
     yield from bench.comes_back(_COMES_WITHIN)
     yield from bench.static_again()
-    if not asks:
+    if not asked():
         raise failed("after a restart it goes on with the node id that it was given before")
     return "after a restart it asks again"
 

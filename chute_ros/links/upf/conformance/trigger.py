@@ -8,6 +8,7 @@ from functools import partial
 from itertools import count
 from typing import Any
 
+from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import READS, Risk, Trial, Wait, failed, not_supported, not_tried
 from chute_ros.links.upf.conformance import node_id, standard, wire
 from chute_ros.links.upf.conformance.bench import (
@@ -68,9 +69,10 @@ def _can_fire(bench: UpfBench) -> Trial:
 def _fires(bench: UpfBench, since: int) -> Any:
     """The first status from this place of heard on that tells it; None: none does in time."""
 
-    def told() -> HeardTransfer | None:
-        return next((one for one in _statuses(bench, since) if _fired(bench, one)), None)
+    def fits(one: HeardTransfer) -> bool:
+        return one.kind == names.TRIGGER_STATUS and _fired(bench, one)
 
+    told = first_of(bench.heard, since, fits)
     yield Wait(bench.now + FIRES_WITHIN, told)
     if told():
         bench.deployed_from = len(bench.every)
