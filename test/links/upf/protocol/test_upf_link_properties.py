@@ -97,7 +97,8 @@ def finished(events):
 @given(st.data(), LAYOUT)
 def test_any_transfers_and_requests_never_raise_and_never_make_it_spin(data, name):
     layout = layout_of(name)
-    link = UpfLink(UpfConfig(), layout.types)
+    # Each VehicleStatus is a turn of the loop below.
+    link = UpfLink(UpfConfig(vehicle_status_rate=1.0), layout.types)
     now = START
     events, tokens = [], []
     for step in range(data.draw(st.integers(1, 12))):
