@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_DOWN, Context, Decimal
 from functools import lru_cache
 
@@ -13,6 +13,7 @@ from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.settings import Mode
 from chute_ros.sim.rocket import GRAVITY, Rocket
 
+_F32 = struct.Struct("<f")
 _BOTH_WAYS = (ROUND_FLOOR, ROUND_CEILING)
 #: To the nearest decimal of so many digits.
 _NEAREST = {digits: Context(digits, ROUND_HALF_DOWN) for digits in range(1, 10)}
@@ -21,21 +22,23 @@ _NEAREST = {digits: Context(digits, ROUND_HALF_DOWN) for digits in range(1, 10)}
 def rust_text(value: float, bits: int) -> str:
     """A float of 32 or 64 bits as Rust's {} prints it: shortest, and never with an exponent."""
     if bits == 32:
-        value = _rounded_to_f32(value)
+        return _text_of_f32(_f32(value))
+    return _signed_text(value, lambda size: Decimal(repr(size)))
+
+
+# Most fields do not change from line to line. By its bytes, as 0 and -0 are equal.
+@lru_cache(maxsize=4096)
+def _text_of_f32(value: bytes) -> str:
+    return _signed_text(_F32.unpack(value)[0], _shortest_f32)
+
+
+def _signed_text(value: float, shortest: Callable[[float], Decimal]) -> str:
+    """shortest: the digits of a finite number >= 0."""
     if math.isnan(value):
         return "NaN"
     sign = "-" if math.copysign(1.0, value) < 0.0 else ""
-    value = abs(value)
-    if math.isinf(value):
-        return f"{sign}inf"
-    return sign + (_text_of_f32(value) if bits == 32 else _without_exponent(Decimal(repr(value))))
-
-
-# Most fields do not change from line to line.
-@lru_cache(maxsize=4096)
-def _text_of_f32(value: float) -> str:
-    """value: >= 0."""
-    return _without_exponent(_shortest_f32(value))
+    size = abs(value)
+    return sign + ("inf" if math.isinf(size) else _without_exponent(shortest(size)))
 
 
 def _without_exponent(digits: Decimal) -> str:
@@ -129,11 +132,15 @@ def _text(kind: FieldType, value: float) -> str:
     return str(int(max(kind.lowest, min(kind.highest, value))))
 
 
-def _rounded_to_f32(value: float) -> float:
+def _f32(value: float) -> bytes:
     try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+        return _F32.pack(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return _F32.pack(math.copysign(math.inf, value))
+
+
+def _rounded_to_f32(value: float) -> float:
+    return float(_F32.unpack(_f32(value))[0])
 
 
 def _shortest_f32(value: float) -> Decimal:
