@@ -130,8 +130,8 @@ VALUES: st.SearchStrategy[p.Value | None] = st.one_of(
 )
 
 
-@settings(max_examples=10)
-@given(told=st.dictionaries(st.sampled_from([one.name for one in p.PARAMETERS]), VALUES))
+@settings(max_examples=5)
+@given(told=st.fixed_dictionaries({one.name: VALUES for one in p.PARAMETERS}))
 def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Value | None]) -> None:
     run = Run(Risk.NONE)
     right = run.controller.services[bus_requests.GET_SET]
@@ -148,7 +148,7 @@ def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Valu
     assert [*results(run.line)] == NAMES
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(
     states=st.lists(st.integers(0, 7), min_size=1),
     uptimes=st.lists(st.integers(0, 2**32 - 1), min_size=1),
@@ -466,7 +466,7 @@ def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service: s
     whole(run.line)
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(
     states=st.lists(st.integers(0, 7), min_size=1),
     launched=st.lists(st.booleans(), min_size=1),
