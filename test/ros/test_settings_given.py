@@ -79,7 +79,8 @@ def test_a_setting_that_ros_would_take_for_a_new_name_of_topics_is_told() -> Non
     code, (line, usage) = start("safety_supervisor", "--", "mode:=SHADOW")
     assert code == 2
     assert line == (
-        "safety_supervisor: unknown argument mode:=SHADOW: the settings of a node follow --ros-args"
+        "safety_supervisor: unknown argument mode:=SHADOW: the settings of a node follow "
+        "--ros-args"
     )
     assert "[-p PARAMETER:=VALUE]" in usage
 
