@@ -137,6 +137,27 @@ def test_one_that_runs_away_at_touch_down_releases_nothing() -> None:
 
 
 @AIRCRAFT
+@pytest.mark.parametrize(
+    "told",
+    [{"reboot_count": 1, "rebooted_in_flight": True}, {"system_status": 6}],
+    ids=["started anew", "emergency"],
+)
+@pytest.mark.parametrize("force", [0.3, 2.0, 3.5])
+@pytest.mark.parametrize("row", [2, 3, 5])
+def test_an_accelerometer_that_fails_beside_what_an_autopilot_says_ends_no_hover(
+    profile: str, told: dict[str, Any], force: float, row: int
+) -> None:
+    """What it says of itself is no sign of a fall; the force is one, which all else denies."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 60.0, true_height=60.0)
+    teller.hover(1.0, 60.0, true_height=60.0, **told)
+    teller.hover(row * EVERY, 60.0, true_height=60.0, force=force, **told)
+    teller.hover(1.0, 60.0, true_height=60.0, **told)
+    assert teller.story.fired() == []
+
+
+@AIRCRAFT
 @pytest.mark.parametrize("drift", [1.5, 2.0, 3.0, 4.0, 6.0])
 @pytest.mark.parametrize("barometer", [True, False])
 def test_an_estimator_that_sinks_while_the_vehicle_hovers_ends_no_flight(

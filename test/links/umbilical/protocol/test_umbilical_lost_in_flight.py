@@ -108,6 +108,19 @@ def test_it_is_on_the_ground_again_once_its_altitude_stays():
     assert status(rocket, now).faults == ()
 
 
+def test_the_next_flight_knows_nothing_of_a_restart_in_the_one_before():
+    """A flight computer that is not switched off between two flights."""
+    rocket, now = restarted_in_flight()
+    rocket.descends(now, 10.0, mode=STARTUP, height=300.0, speed=30.0)
+    rocket.descends(now + 10.0, 5.0, mode=STARTUP, height=0.0, speed=0.0)
+    rocket.says(now + 60.0, STANDBY, altitude="0")
+    rocket.says(now + 61.0, ASCENT, altitude="200")
+    rocket.says(now + 61.1, ASCENT, altitude="215")
+    assert rocket.computer.flying
+    assert status(rocket, now + 61.1).faults == ()
+    assert not vehicle(rocket, now + 61.1).rebooted_in_flight
+
+
 def test_a_clock_that_starts_at_zero_is_a_restart_as_well():
     rocket = flown((0.0, ASCENT))
     for at, clock in ((1.0, 0), (1.07, 70), (1.17, 170)):
