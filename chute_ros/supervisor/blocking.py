@@ -57,6 +57,9 @@ def check_links(turn: Turn) -> None:
             # otherwise: the heartbeat that makes the link whole may overtake it.
             last_said = turn.state.armed(turn.config) + turn.state.armed(turn.config, False)
             heard = [one for one in last_said if turn.state.hears(turn.config, one[0], turn.now)]
+            mute = [link for link in turn.config.deploy_links if turn.state.unmonitored(link)]
+            if not heard and mute and turn.flight.armed_on_ground:
+                turn.move(Event.ARMED, f"{', '.join(mute)} was armed, and cannot tell otherwise")
             _show_armed(turn, heard)
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")

@@ -66,6 +66,19 @@ def test_its_node_must_be_heard() -> None:
     assert "relay: STALE, heartbeat of its node" in reasons(story)
 
 
+def test_one_that_a_person_armed_is_armed_after_a_gap_of_a_link_too() -> None:
+    story = standing(RELAY)
+    story.at(12.0, *beats(story), i.ArmDone(1, True, True, "it can always fire"))
+    assert story.state.stage is Stage.ARMED
+    for step in range(1, 81):
+        heard = beats(story) if step > 20 else (story.heartbeat(),)
+        story.at(12.0 + step * 0.1, *heard, story.told(**DOWN, height=0.0))
+        assert step != 20 or story.state.stage is Stage.BLOCKED
+    assert story.state.stage is Stage.ARMED
+    story.at(20.1, *beats(story), i.ArmDone(2, False, True, "disarmed"))
+    assert story.state.stage is Stage.READY
+
+
 def test_it_is_the_last_step_of_a_deploy_wherever_it_is_named() -> None:
     links = {"deploy_links": (RELAY, LINK), "required_links": (LINK,)}
     config = SupervisorConfig(unmonitored_links=(RELAY,), **links)

@@ -33,7 +33,7 @@ from chute_ros.tools.panel.tones import TONES
 MEANINGS = {
     "STARTUP": "The supervisor waits for the first word of its links.",
     "BLOCKED": "The vehicle must not take off.",
-    "READY": "Nothing forbids the take-off; no parachute is armed.",
+    "READY": "Nothing forbids the take-off; no parachute says that it is armed.",
     "ARMED": "The parachutes are armed: keep clear of them. Nothing forbids the take-off.",
     "IN_FLIGHT": "The vehicle flies, and is guarded.",
     "KILLING": "The motors are being stopped.",
