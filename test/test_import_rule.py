@@ -31,33 +31,36 @@ def test_the_rule_holds(copy):
     assert "0 broken" in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("package", "line", "named"),
-    [
-        ("protocol", "import socket", "socket"),
-        ("protocol", "from time import monotonic", "time"),
-        ("protocol", "import os.path", "os"),
-        ("protocol", "def late():\n    import rclpy.node", "rclpy"),
-        ("supervisor", "from threading import Lock", "threading"),
-        ("supervisor", "import serial", "serial"),
-        ("runtime", "import threading", "threading"),
-        ("runtime", "from chute_ros.transport import offender", "chute_ros.transport"),
-        ("links.upf.protocol", "import rclpy", "rclpy"),
-        ("links.mavlink.protocol", "from time import monotonic", "time"),
-        ("links.upf.protocol", "from chute_ros.links import mavlink", "chute_ros.links.mavlink"),
-        ("campaign", "from chute_ros.supervisor.core import update", "chute_ros.supervisor.core"),
-        ("protocol", "from chute_ros.ros import offender", "chute_ros.ros"),
-        ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
-        ("sim", "from chute_ros.ros import offender", "chute_ros.ros"),
-    ],
-)
-def test_the_rule_names_an_offender(copy, package, line, named):
+#: Package, what a module of it says, and what is named of that.
+OFFENDERS = [
+    ("protocol", "import socket", "socket"),
+    ("protocol", "from time import monotonic", "time"),
+    ("protocol", "import os.path", "os"),
+    ("protocol", "def late():\n    import rclpy.node", "rclpy"),
+    ("supervisor", "from threading import Lock", "threading"),
+    ("supervisor", "import serial", "serial"),
+    ("runtime", "import threading", "threading"),
+    ("runtime", "from chute_ros.transport import offender", "chute_ros.transport"),
+    ("links.upf.protocol", "import rclpy", "rclpy"),
+    ("links.mavlink.protocol", "from time import monotonic", "time"),
+    ("links.upf.protocol", "from chute_ros.links import mavlink", "chute_ros.links.mavlink"),
+    ("campaign", "from chute_ros.supervisor.core import update", "chute_ros.supervisor.core"),
+    ("protocol", "from chute_ros.ros import offender", "chute_ros.ros"),
+    ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
+    ("sim", "from chute_ros.ros import offender", "chute_ros.ros"),
+]
+
+
+def test_the_rule_names_each_offender(copy):
     for layer in ("ros", "transport"):
         (copy / "chute_ros" / layer / "offender.py").touch()
-    (copy / "chute_ros" / package.replace(".", "/") / "offending.py").write_text(line + "\n")
+    for number, (package, line, _) in enumerate(OFFENDERS):
+        file = copy / "chute_ros" / package.replace(".", "/") / f"offending_{number}.py"
+        file.write_text(line + "\n")
     result = lint(copy)
     assert result.returncode == 1
-    assert f"chute_ros.{package}.offending -> {named}" in result.stdout
+    for number, (package, _, named) in enumerate(OFFENDERS):
+        assert f"chute_ros.{package}.offending_{number} -> {named}" in result.stdout
 
 
 def test_a_shared_type_may_import_nothing_of_ours(copy):
