@@ -14,6 +14,7 @@ import pytest
 import yaml
 from mavlink_bench import Autopilot, Network, quick
 from rclpy.parameter import Parameter
+from starts import starts
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
@@ -125,37 +126,48 @@ def run(node, *parameters, namespace="/"):
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize(
-    ("node", "given", "said"),
-    [
-        (MAVLINK, "ack_tries:=0", "parameter ack_tries of {ns}/mavlink_parachute is 0: need a "),
-        (MAVLINK, "connection:=udp", "connection 'udp' is not understood: need udpin:HOST:PORT"),
-        (MAVLINK, "signing_key_file:=/none", "parameter signing_key_file: /none: No such file"),
-        (SUPERVISOR, "mode:=on", "parameter mode of {ns}/safety_supervisor is "),
-        (SUPERVISOR, "kill_links:=[]", "kill_links"),
-        (
-            SUPERVISOR,
-            "require_vehicle_state:=[]",
-            "vehicle_state of {ns}/safety_supervisor is []: need",
-        ),
-        (
-            MAVLINK,
-            "system_id:=[]",
-            "system_id of {ns}/mavlink_parachute is []: need a whole number",
-        ),
-        (SUPERVISOR, "profile:=~nobody_at_all/x.yaml", "profile is '~nobody_at_all/x.yaml': "),
-        (UMBILICAL, "telem_path:=~nobody_at_all", "parameter telem_path is '~nobody_at_all': "),
-        (MAVLINK, "signing_key_file:=~nobody_at_all/key", "is '~nobody_at_all/key': "),
-        (UPF, "dsdl_path:=~nobody_at_all", "parameter dsdl_path is '~nobody_at_all': "),
-    ],
-)
-def test_a_real_start_ends_in_one_line(namespace, node, given, said):
-    code, text = run(node, given, namespace=namespace)
-    assert code == 2
-    assert "Traceback" not in text
+#: Node, parameter, what is said of it.
+REFUSED = [
+    (MAVLINK, "ack_tries:=0", "parameter ack_tries of {ns}/mavlink_parachute is 0: need a "),
+    (MAVLINK, "connection:=udp", "connection 'udp' is not understood: need udpin:HOST:PORT"),
+    (MAVLINK, "signing_key_file:=/none", "parameter signing_key_file: /none: No such file"),
+    (SUPERVISOR, "mode:=on", "parameter mode of {ns}/safety_supervisor is "),
+    (SUPERVISOR, "kill_links:=[]", "kill_links"),
+    (
+        SUPERVISOR,
+        "require_vehicle_state:=[]",
+        "vehicle_state of {ns}/safety_supervisor is []: need",
+    ),
+    (
+        MAVLINK,
+        "system_id:=[]",
+        "system_id of {ns}/mavlink_parachute is []: need a whole number",
+    ),
+    (SUPERVISOR, "profile:=~nobody_at_all/x.yaml", "profile is '~nobody_at_all/x.yaml': "),
+    (UMBILICAL, "telem_path:=~nobody_at_all", "parameter telem_path is '~nobody_at_all': "),
+    (MAVLINK, "signing_key_file:=~nobody_at_all/key", "is '~nobody_at_all/key': "),
+    (UPF, "dsdl_path:=~nobody_at_all", "parameter dsdl_path is '~nobody_at_all': "),
+]
+
+
+def assert_told(node, said, namespace, code, text):
+    assert code == 2, text
     (line,) = text.splitlines()
     assert line.startswith(f"{node}: ")
     assert said.format(ns=namespace) in line
+
+
+def test_a_real_start_ends_in_one_line(namespace):
+    node, given, said = REFUSED[0]
+    assert_told(node, said, namespace, *run(node, given, namespace=namespace))
+
+
+@pytest.mark.parametrize("node", [*NODES, UPF, UMBILICAL])
+def test_and_so_it_ends_whatever_is_wrong(namespace, node):
+    mine = [(given, said) for whose, given, said in REFUSED if whose == node]
+    cases = [["--ros-args", "-r", f"__ns:={namespace}", "-p", given] for given, _ in mine]
+    for (_, said), (code, _, text) in zip(mine, starts(node, *cases), strict=True):
+        assert_told(node, said, namespace, code, text)
 
 
 @pytest.mark.parametrize("node", NODES)
@@ -376,23 +388,15 @@ def test_a_node_whose_middleware_hangs_at_the_end_is_gone_all_the_same(namespace
 # Arguments that are not for ROS
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
+def test_what_is_not_for_ros_starts_no_supervisor():
+    expected = [
         (["--help"], 0, "usage: safety_supervisor --ros-args [-p PARAMETER:=VALUE]"),
         (["--bogus"], 2, "unknown argument --bogus: the settings of a node follow --ros-args"),
         (["-p", "mode:=SHADOW"], 2, "unknown argument -p: the settings of a node"),
         (["--ros-args", "-p", "mode:=SHADOW", "--", "x"], 2, "unknown argument x"),
-    ],
-)
-def test_what_is_not_for_ros_starts_no_supervisor(arguments, code, said):
-    done = subprocess.run(
-        [sys.executable, "-m", "chute_ros.ros.safety_supervisor", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
-    assert done.returncode == code
-    assert said in done.stdout + done.stderr
-    assert "decision" not in done.stdout + done.stderr
+    ]
+    told = starts(SUPERVISOR, *(arguments for arguments, _, _ in expected))
+    for (arguments, code, said), (ended, out, err) in zip(expected, told, strict=True):
+        assert ended == code, arguments
+        assert said in out + err
+        assert "decision" not in out + err

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from launch_files import LAUNCH, Recorded, made_by
+from starts import starts
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.registered import module_of
@@ -40,34 +41,39 @@ def start(node: str, *arguments: str) -> tuple[int, list[str]]:
     return done.returncode, done.stderr.splitlines()
 
 
+#: Arguments, and what is told of them.
+REFUSED = [
+    (("--params-file", "FOLDER/none.yaml"), "Couldn't parse params file: '--params-file"),
+    (("--params-file", "FOLDER/broken.yaml"), "Couldn't parse params file: '--params-file"),
+    (("--params-file",), "Couldn't parse trailing --params-file flag"),
+    (("-r",), "Couldn't parse trailing -r flag"),
+    (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
+    (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
+    (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
+    (("-p", "nobody:mode:=SHADOW"), "'-p nobody:mode:=SHADOW' is for a node /nobody, this"),
+    (("-p", "url:=x"), "'-p url:=x': /"),
+    (("--param", "url:=x"), "has no parameter url: correct its name, or leave it out"),
+    (("--params-file", "FOLDER/unknown.yaml"), "has no parameter url: correct its name, or"),
+]
+
+
 @pytest.mark.parametrize("node", ["upf_can", "safety_supervisor"])
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--params-file", "FOLDER/none.yaml"), "Couldn't parse params file: '--params-file"),
-        (("--params-file", "FOLDER/broken.yaml"), "Couldn't parse params file: '--params-file"),
-        (("--params-file",), "Couldn't parse trailing --params-file flag"),
-        (("-r",), "Couldn't parse trailing -r flag"),
-        (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
-        (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
-        (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
-        (("-p", "nobody:mode:=SHADOW"), "'-p nobody:mode:=SHADOW' is for a node /nobody, this"),
-        (("-p", "url:=x"), "'-p url:=x': /"),
-        (("--param", "url:=x"), "has no parameter url: correct its name, or leave it out"),
-        (("--params-file", "FOLDER/unknown.yaml"), "has no parameter url: correct its name, or"),
-    ],
-)
 def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
-    node: str, arguments: tuple[str, ...], words: str, tmp_path: Path
+    node: str, tmp_path: Path
 ) -> None:
     (tmp_path / "broken.yaml").write_text("upf_can: [")
     (tmp_path / "unknown.yaml").write_text(f"/**/{node}:\n  ros__parameters:\n    url: x\n")
     (tmp_path / "other.yaml").write_text("somebody:\n  ros__parameters:\n    call_tries: 4\n")
-    code, said = start(node, *(one.replace("FOLDER", str(tmp_path)) for one in arguments))
-    assert code == 2
-    (line,) = said
-    assert line.startswith(f"{node}: ")
-    assert words in line
+    given = [
+        ["--ros-args", *(one.replace("FOLDER", str(tmp_path)) for one in arguments)]
+        for arguments, _ in REFUSED
+    ]
+    for arguments, (_, words), told in zip(given, REFUSED, starts(node, *given), strict=True):
+        code, out, err = told
+        assert (code, out) == (2, ""), (arguments, told)
+        (line,) = err.splitlines()
+        assert line.startswith(f"{node}: "), arguments
+        assert words in line, arguments
 
 
 def test_a_setting_that_ros_would_take_for_a_new_name_of_topics_is_told() -> None:
