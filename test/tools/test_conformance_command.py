@@ -17,6 +17,7 @@ from junitparser import JUnitXml
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+from chute_ros.tools.conformance import command
 from chute_ros.tools.isolation import free_udp_ports
 
 SIMULATOR = [sys.executable, "-u", "-m"]
@@ -183,6 +184,16 @@ def test_a_wire_that_is_not_there_is_told_at_once() -> None:
     assert "/dev/not_there" in errors
 
 
+def refused(monkeypatch, capsys, *arguments: str) -> tuple[str, str]:
+    """What the command, called here, says as it ends with a mistake: output and errors."""
+    monkeypatch.setattr(sys, "argv", ["conformance", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert ended.value.code == 2
+    told: tuple[str, str] = capsys.readouterr()
+    return told
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -193,11 +204,19 @@ def test_a_wire_that_is_not_there_is_told_at_once() -> None:
         (["mavlink", "--connection", "abc"], "connection 'abc' is not understood"),
     ],
 )
-def test_a_mistake_in_the_command_line_ends_with_2(arguments: list[str], told: str) -> None:
-    with started(*COMMAND, *arguments) as kit:
-        out, errors = kit.communicate(timeout=60.0)
-    assert (kit.returncode, out) == (2, "")
+def test_a_mistake_in_the_command_line_ends_with_2(
+    arguments: list[str], told: str, monkeypatch, capsys
+) -> None:
+    out, errors = refused(monkeypatch, capsys, *arguments)
+    assert out == ""
     assert f"conformance: {told}" in errors
+
+
+def test_a_mistake_ends_the_process_with_2() -> None:
+    with started(*COMMAND, "mavlink", "--connection", "abc") as kit:
+        out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, out, errors.count("\n")) == (2, "", 1)
+    assert errors.startswith("conformance: connection 'abc' is not understood")
 
 
 @pytest.mark.parametrize(
@@ -211,9 +230,7 @@ def test_a_mistake_in_the_command_line_ends_with_2(arguments: list[str], told: s
     ],
 )
 def test_a_number_that_cannot_be_is_refused_with_what_can(
-    device: str, option: str, value: str, told: str
+    device: str, option: str, value: str, told: str, monkeypatch, capsys
 ) -> None:
-    with started(*COMMAND, device, option, value) as kit:
-        _, errors = kit.communicate(timeout=60.0)
-    assert kit.returncode == 2
+    _, errors = refused(monkeypatch, capsys, device, option, value)
     assert errors.endswith(f"conformance {device}: error: argument {option}: {told}\n")
