@@ -44,11 +44,18 @@ class Command:
 def run(bench, *arguments, namespace=None, redirected=""):
     """Run it for the vehicle of this bench, which lives on meanwhile. redirected: its streams, as
     in a shell."""
-    name, *more = arguments
-    given = ("--namespace", namespace or bench.namespace, name, *more)
-    command = Command(*given, redirected=redirected)
-    bench.until(lambda: command.process.poll() is not None, f"chute {name} ends", 60.0)
-    return command.ended()
+    (told,) = run_together(bench, arguments, namespace=namespace, redirected=redirected)
+    return told
+
+
+def run_together(bench, *lines, namespace=None, redirected=""):
+    """The same for several commands that begin at once: what each of them made of it."""
+    named = ("--namespace", namespace or bench.namespace)
+    commands = [Command(*named, *line, redirected=redirected) for line in lines]
+    for line, command in zip(lines, commands, strict=True):
+        ended = command.process.poll
+        bench.until(lambda ended=ended: ended() is not None, f"chute {line[0]} ends", 60.0)
+    return [command.ended() for command in commands]
 
 
 class AtTerminal:

@@ -11,7 +11,7 @@ import sys
 import threading
 
 import pytest
-from chute_bench import COMMAND, CONTROL, ROOT, AtTerminal, Command, run
+from chute_bench import COMMAND, CONTROL, ROOT, AtTerminal, Command, run, run_together
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, PersonRequest, SafetyState
 from chute_msgs.srv import Kill
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -72,14 +72,22 @@ def soon(text):
     return re.sub(r"(?<=[ (])1 s ago", "<1 s ago", text)
 
 
-def test_a_ready_vehicle_is_well(ready):
-    code, out, err = run(ready.bench, "status")
+def test_a_ready_vehicle_is_well_and_its_json_is_one_object(ready):
+    shown, as_json = run_together(ready.bench, ("status",), ("status", "--json"))
+    code, out, err = shown
     assert (code, err) == (0, "")
     lines = soon(out).splitlines()
     assert lines[0] == "READY"
     assert "  mavlink_parachute  OK, device healthy, device <1 s ago, node <1 s ago" in lines
     assert "  motors             DISARMED, <1 s ago" in lines
     assert "  height             never received" in lines
+    code, out, _ = as_json
+    told = json.loads(out)
+    assert (code, out.count("\n")) == (0, 1)
+    assert (told["state"], told["well"]) == ("READY", True)
+    assert told["namespace"] == ready.bench.namespace
+    assert told["vehicle"]["height"] is None
+    assert [one["name"] for one in told["links"]] == ["mavlink_parachute"]
 
 
 def test_a_blocked_vehicle_tells_why(ready):
@@ -106,16 +114,6 @@ def test_each_parachute_of_a_link_is_shown_though_each_tells_of_itself_once_a_se
     assert told == ["1/161", "1/162", "1/163"]
 
 
-def test_its_json_is_one_object(ready):
-    code, out, _ = run(ready.bench, "status", "--json")
-    told = json.loads(out)
-    assert (code, out.count("\n")) == (0, 1)
-    assert (told["state"], told["well"]) == ("READY", True)
-    assert told["namespace"] == ready.bench.namespace
-    assert told["vehicle"]["height"] is None
-    assert [one["name"] for one in told["links"]] == ["mavlink_parachute"]
-
-
 def test_its_json_is_alone_where_the_middleware_complains_too(ready, monkeypatch):
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "/nowhere.xml")
     code, out, err = run(ready.bench, "status", "--json")
@@ -124,17 +122,18 @@ def test_its_json_is_alone_where_the_middleware_complains_too(ready, monkeypatch
 
 
 def test_where_nothing_is_heard_it_says_where_it_looked_and_what_there_is(ready):
-    code, out, err = run(ready.bench, "status", "--timeout", "5", namespace="/nobody/here")
+    status = ("status", "--timeout", "5")
+    alone, as_json = run_together(
+        ready.bench, status, (*status, "--json"), namespace="/nobody/here"
+    )
+    code, out, err = alone
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith(
         "chute: no supervisor is received in /nobody/here within 5 s (ROS domain "
     )
     assert "discovery range LOCALHOST, rmw_fastrtps_cpp" in err
     assert f"vehicles found: {ready.bench.namespace}; name one" in err
-
-
-def test_the_same_as_json(ready):
-    code, out, _ = run(ready.bench, "status", "--json", namespace="/nobody/here")
+    code, out, _ = as_json
     told = json.loads(out)
     assert (code, told["namespace"]) == (1, "/nobody/here")
     assert told["vehicles"] == [ready.bench.namespace]
@@ -171,27 +170,23 @@ def test_arm_and_disarm_by_the_supervisor(ready):
     assert [arm for arm, _ in ready.link.arm_requests] == [True, False]
 
 
-@pytest.mark.parametrize("succeeds", [True, False])
-def test_who_ordered_it_and_what_came_of_it_is_on_the_record(ready, succeeds):
+def test_who_ordered_it_and_what_came_of_it_is_on_the_record(ready):
     """Given orders that have no reason, in which its giver could stand."""
     heard = ready.bench.follow(PersonRequest, "safety/person")
-    ready.link.arm_succeeds = succeeds
-    run(ready.bench, "arm")
-    ready.bench.until(lambda: any(one.answered for one in heard), "the answer is recorded")
-    told = heard[-1]
-    assert (told.link, told.service) == ("chute", "safety/arm")
-    assert re.fullmatch(r"arm=True, triggers=0, by='\S+@\S+'", told.request)
-    assert (told.success, told.message) == (succeeds, "mavlink_parachute: as told")
-    assert told.after > 0.0
-    assert told.header.stamp == heard[0].header.stamp
-
-
-def test_a_refusal_is_no_success(ready):
-    ready.link.arm_succeeds = False
-    code, out, _ = run(ready.bench, "arm")
-    assert code == 1
-    assert out.startswith("arm: NOT DONE: ")
-    assert "as told" in out
+    for succeeds, ended, said in ((True, 0, "arm: done: "), (False, 1, "arm: NOT DONE: ")):
+        heard.clear()
+        ready.link.arm_succeeds = succeeds
+        code, out, _ = run(ready.bench, "arm")
+        assert code == ended
+        assert out.startswith(said)
+        assert "as told" in out
+        ready.bench.until(lambda: any(one.answered for one in heard), "the answer is recorded")
+        told = heard[-1]
+        assert (told.link, told.service) == ("chute", "safety/arm")
+        assert re.fullmatch(r"arm=True, triggers=0, by='\S+@\S+'", told.request)
+        assert (told.success, told.message) == (succeeds, "mavlink_parachute: as told")
+        assert told.after > 0.0
+        assert told.header.stamp == heard[0].header.stamp
 
 
 def test_by_a_device_node_past_the_supervisor(ready):
@@ -220,14 +215,13 @@ def test_reset_after_a_kill(ready):
     ready.await_stage(SafetyState.READY)
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
-def test_an_order_is_sent_whatever_stream_is_closed(ready, closed):
-    code, _, err = run(ready.bench, "arm", redirected=closed)
-    assert (code, err) == (0, "")
-    assert ready.link.arm_requests == [(True, 0)]
-
-
-def test_an_order_whose_answer_cannot_be_printed_tells_it_on_standard_error(ready):
+def test_an_order_is_sent_whatever_stream_is_closed(ready):
+    for closed in ("<&-", ">&-", "2>&-", "<&- >&- 2>&-"):
+        code, _, err = run(ready.bench, "arm", redirected=closed)
+        assert (code, err) == (0, ""), closed
+        assert ready.link.arm_requests == [(True, 0)], closed
+        ready.link.arm_requests.clear()
+    # Where its answer cannot be printed, standard error tells it.
     code, _, err = run(ready.bench, "arm", redirected=">/dev/full")
     assert (code, ready.link.arm_requests) == (74, [(True, 0)])
     answer, why = err.splitlines()
@@ -284,15 +278,12 @@ def cut_off(flying):
     return flying
 
 
-@pytest.mark.parametrize("order", ["deploy", "kill"])
-def test_that_no_parachute_can_be_reached_is_told_before_the_word_is_typed(
-    cut_off, terminal, order
-):
-    asked = terminal(order)
-    asked.reads("anything else to leave it: ")
-    assert UNREACHED in " ".join(asked.shown.split())
-    asked.types("no\n")
-    assert asked.end() == 1
+def test_that_no_parachute_can_be_reached_is_told_before_the_word_is_typed(cut_off, terminal):
+    for asked in [terminal(order) for order in ("deploy", "kill")]:
+        asked.reads("anything else to leave it: ")
+        assert UNREACHED in " ".join(asked.shown.split())
+        asked.types("no\n")
+        assert asked.end() == 1
     assert ordered(cut_off) == []
 
 
@@ -309,27 +300,27 @@ def test_a_kill_alone_needs_no_parachute(cut_off):
     assert (code, err) == (0, "")
 
 
-@pytest.mark.parametrize("stdin", ["", "<&-"])
-@pytest.mark.parametrize("order", ["deploy", "kill"])
-def test_without_a_terminal_and_without_yes_nothing_is_sent(flying, order, stdin):
-    code, out, err = run(flying.bench, order, "--reason", "anything", redirected=stdin)
-    assert (code, out) == (2, "")
-    assert err == (
-        f"chute: {order}: no terminal to ask at: nothing was sent; --yes does not ask\n"
-    )
+def test_without_a_terminal_and_without_yes_nothing_is_sent(flying):
+    orders = ("deploy", "kill")
+    for stdin in ("", "<&-"):
+        lines = [(order, "--reason", "anything") for order in orders]
+        told = run_together(flying.bench, *lines, redirected=stdin)
+        for order, (code, out, err) in zip(orders, told, strict=True):
+            assert (code, out) == (2, "")
+            assert err == (
+                f"chute: {order}: no terminal to ask at: nothing was sent; --yes does not ask\n"
+            )
     assert ordered(flying) == []
 
 
-@pytest.mark.parametrize(
-    ("order", "typed"),
-    [("deploy", "yes\n"), ("deploy", "deploy\n"), ("deploy", "KILL\n"), ("kill", "\n")],
-)
-def test_another_word_sends_nothing(flying, terminal, order, typed):
-    asked = terminal(order)
-    asked.reads("anything else to leave it: ")
-    asked.types(typed)
-    assert asked.end() == 1
-    assert f"chute: {order}: not confirmed, nothing was sent" in asked.shown
+def test_another_word_sends_nothing(flying, terminal):
+    words = [("deploy", "yes\n"), ("deploy", "deploy\n"), ("deploy", "KILL\n"), ("kill", "\n")]
+    terminals = [terminal(order) for order, _ in words]
+    for asked, (order, typed) in zip(terminals, words, strict=True):
+        asked.reads("anything else to leave it: ")
+        asked.types(typed)
+        assert asked.end() == 1
+        assert f"chute: {order}: not confirmed, nothing was sent" in asked.shown
     assert ordered(flying) == []
 
 
@@ -353,14 +344,15 @@ def test_what_was_typed_before_the_question_is_no_answer(flying, terminal):
     assert ordered(flying) == []
 
 
-@pytest.mark.parametrize("key", ["\x03", "\x04"])
-def test_ctrl_c_and_ctrl_d_at_the_question_send_nothing(flying, terminal, key):
-    asked = terminal("deploy")
-    asked.reads("leave it: ")
-    asked.types(key)
-    assert asked.end() == {"\x03": 130, "\x04": 1}[key]
+def test_ctrl_c_and_ctrl_d_at_the_question_send_nothing(flying, terminal):
+    keys = {"\x03": 130, "\x04": 1}
+    terminals = [terminal("deploy") for _ in keys]
+    for asked, (key, code) in zip(terminals, keys.items(), strict=True):
+        asked.reads("leave it: ")
+        asked.types(key)
+        assert asked.end() == code
+        assert "Traceback" not in asked.shown
     assert ordered(flying) == []
-    assert "Traceback" not in asked.shown
 
 
 @pytest.fixture
@@ -514,12 +506,15 @@ def test_a_node_that_sends_no_diagnostics_is_told(ready, beating):
     """It hangs, or hung before this command began: then the supervisor alone says it should be."""
     ready.link.diagnosing, ready.link.beating = False, beating
     ready.bench.until(lambda: beating or ready.states[-1].link_states[0] == LinkState.LOST, "lost")
-    code, out, _ = run(ready.bench, "diagnostics", "--timeout", "4")
+    diagnostics, doctor = run_together(
+        ready.bench, ("diagnostics", "--timeout", "4"), ("doctor", "--timeout", "4")
+    )
+    code, out, _ = diagnostics
     assert code == 1
     place = f"{ready.bench.namespace}/mavlink_parachute".lstrip("/")
     told = f"STALE  {place}: diagnostics: nothing received within 4 s (never received)"
     assert told in out.splitlines()
-    code, out, _ = run(ready.bench, "doctor", "--timeout", "4")
+    code, out, _ = doctor
     assert code == 1
     assert "WRONG  mavlink_parachute: no diagnostics: nothing received within 4 s -> " in out
 
@@ -531,8 +526,14 @@ def test_a_node_that_is_gone_is_told_with_the_parameters(ready):
     assert err == "chute: mavlink_parachute did not answer within 4 s\n"
 
 
-def test_parameters_show_what_differs_from_the_default(ready):
-    code, out, _ = run(ready.bench, "parameters", "safety_supervisor")
+def test_parameters_show_what_differs_from_the_default_and_a_node_that_is_not_there(ready):
+    of_one, all_changed, not_there = run_together(
+        ready.bench,
+        ("parameters", "safety_supervisor"),
+        ("parameters", "--changed", "--json"),
+        ("parameters", "upf_can"),
+    )
+    code, out, _ = of_one
     lines = out.splitlines()
     assert (code, lines[0]) == (0, "safety_supervisor")
     assert [line.split() for line in lines if line.startswith("  *")] == [
@@ -541,10 +542,7 @@ def test_parameters_show_what_differs_from_the_default(ready):
         ["*", "kill_timeout", "2.0", "(default:", "6.0)"],
     ]
     assert any(line.split() == ["profile", '"multirotor"'] for line in lines)
-
-
-def test_parameters_of_all_nodes_as_json(ready):
-    code, out, _ = run(ready.bench, "parameters", "--changed", "--json")
+    code, out, _ = all_changed
     told = json.loads(out)
     assert (code, told["silent"]) == (0, [])
     assert told["nodes"]["mavlink_parachute"] == []
@@ -554,10 +552,7 @@ def test_parameters_of_all_nodes_as_json(ready):
         "default": 10.0,
         "differs": True,
     }
-
-
-def test_a_node_that_is_not_there(ready):
-    code, _, err = run(ready.bench, "parameters", "upf_can")
+    code, _, err = not_there
     assert code == 1
     assert err.startswith("chute: no node upf_can is found in ")
     assert "nodes there: mavlink_parachute, safety_supervisor" in err
@@ -589,8 +584,7 @@ def test_without_a_black_box_it_says_so(bench):  # noqa: F811
 # What others may send, and what a shell may do
 
 
-@pytest.mark.parametrize("command", ["status", "diagnostics", "parameters"])
-def test_no_control_character_reaches_the_terminal(ready, command):
+def test_no_control_character_reaches_the_terminal(ready):
     client = ready.bench.client
     client.declare_parameter("evil", HOSTILE)
     senders = [
@@ -635,9 +629,10 @@ def test_no_control_character_reaches_the_terminal(ready, command):
         )
     ]
     client.create_timer(0.1, lambda: [send() for send in senders])
-    code, out, err = run(ready.bench, command)
-    assert "evil" in out, (code, out, err)
-    assert CONTROL.findall(out + err) == []
+    for command in ("status", "diagnostics", "parameters"):
+        code, out, err = run(ready.bench, command)
+        assert "evil" in out, (command, code, out, err)
+        assert CONTROL.findall(out + err) == []
 
 
 def test_a_reader_that_has_seen_enough(ready):
