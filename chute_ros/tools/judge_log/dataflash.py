@@ -14,8 +14,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from pymavlink import DFReader
-
 from chute_ros.model import VTOL
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
@@ -81,6 +79,9 @@ def read(path: Path) -> FlightLog:
 
 
 def _read(path: Path) -> FlightLog:
+    # Here: it brings another dialect along, for which no other log has to wait.
+    from pymavlink import DFReader
+
     with open_regular(path) as file:
         binary = file.read(2) == MAGIC
     if binary:
