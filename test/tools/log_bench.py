@@ -33,11 +33,12 @@ STREAMS = {
     dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: 100_000,
     dialect.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
 }
-#: It takes off to HEIGHT, m, and has landed at LANDED_AT, s; or a motor fails on the way.
-HEIGHT, LANDED_AT, FAILS_AT = 30.0, 31.0, 15.0
-TAKES_OFF = [(2.0, "arm"), (4.0, f"takeoff={HEIGHT:g}")]
-LANDS = [*TAKES_OFF, (14.0, "land")]
-FAILS = [*TAKES_OFF, (FAILS_AT, "fail-motor")]
+#: It takes off to HEIGHT, m, and has landed at LANDED_AT, s; or a motor fails at another height.
+HEIGHT, LANDED_AT = 12.0, 16.0
+FALLS_FROM, FAILS_AT = 20.0, 13.0
+_ARMS = (2.0, "arm")
+LANDS = [_ARMS, (4.0, f"takeoff={HEIGHT:g}"), (8.0, "land")]
+FAILS = [_ARMS, (4.0, f"takeoff={FALLS_FROM:g}"), (FAILS_AT, "fail-motor")]
 EPOCH_US = 1_700_000_000_000_000
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from log_bench import FAILS, FAILS_AT, LANDED_AT, LANDS, flown, tlog
+from log_bench import FAILS, FAILS_AT, FALLS_FROM, LANDED_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command, formats
@@ -68,7 +68,7 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
     assert "| well.tlog | it takes off and lands |" in text
     assert "a motor fails (simulated)" in text
     height = text.partition("released at ")[2].partition(" m")[0]
-    assert 20 < int(height) < 30
+    assert 0.7 * FALLS_FROM < int(height) < FALLS_FROM
     assert "- none.bin: it is empty" in text
     assert "- well.tlog: some/repo: a/b.tlog" in text
     with pytest.raises(ChuteError, match=r"no line for well\.tlog"):
