@@ -4,14 +4,13 @@ import contextlib
 import os
 import re
 import shutil
-import signal
 import socket
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
+from command_bench import flying, interrupted
 from dask_bench import dask_bench
 
 import chute_ros
@@ -23,17 +22,37 @@ from chute_ros.errors import CampaignError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools import campaign_cluster, campaign_command
 
-SEEDS, BUNDLE = range(100, 114), 2
+#: Of short flights.
+SEEDS, BUNDLE = range(117, 125), 2
 PACKAGE = Path(chute_ros.__file__).parent
+# The cluster and the flights of one process are for all.
+pytestmark = pytest.mark.xdist_group("campaign_cluster")
+
+
+@pytest.fixture(scope="module")
+def shared():
+    """The clusters of this module, each until its scheduler has died."""
+    with contextlib.ExitStack() as stack:
+        yield _Shared(stack)
+
+
+class _Shared:
+    def __init__(self, stack):
+        self._stack, self._bench = stack, None
+
+    def bench(self):
+        if self._bench is None or self._bench.scheduler.poll() is not None:
+            self._stack.close()
+            self._bench = self._stack.enter_context(dask_bench())
+        return self._bench
 
 
 @pytest.fixture
-def cluster():
-    """Two workers, and a scheduler."""
-    with dask_bench() as bench:
-        for _ in range(2):
-            bench.start_worker()
-        yield bench
+def cluster(shared):
+    """Two workers, and a scheduler, whatever an earlier test did to them."""
+    bench = shared.bench()
+    bench.has_workers(2)
+    return bench
 
 
 @pytest.fixture(autouse=True)
@@ -71,24 +90,31 @@ def run(monkeypatch, *arguments):
     return 0
 
 
+def transitions(flown):
+    """(key, state before, state after) of the scheduler's tasks, those of earlier tests too."""
+    return flown._client.run_on_scheduler(
+        lambda dask_scheduler: [one[:3] for one in dask_scheduler.transition_log]
+    )
+
+
 def test_a_worker_that_dies_costs_its_bundle_again_and_nothing_else(cluster, by_one_process):
     flown = campaign_cluster.Cluster(cluster.address)
     with contextlib.closing(flown):
         assert flown.workers == 2
+        earlier = {key for key, *_ in transitions(flown)}
         died = []
 
         def look(tally):
-            if tally.flights == 4:
-                cluster.start_worker()
-                address, process = next(iter(cluster.workers.items()))
-                assert flown._client.processing()[address], "it flies"
-                process.kill()
+            if tally.flights == BUNDLE:
+                flies = flown._client.processing()
+                address = max(flies, key=lambda one: len(flies[one]))
+                assert flies[address], "it flies"
+                cluster.workers[address].kill()
                 died.append(address)
+                cluster.start_worker()
 
         tally = flights.run(flown.flown(SEEDS), look, flights.Tally())
-        steps = flown._client.run_on_scheduler(
-            lambda dask_scheduler: [one[1:3] for one in dask_scheduler.transition_log]
-        )
+        steps = [(was, now) for key, was, now in transitions(flown) if key not in earlier]
         left = flown._client.scheduler_info()["workers"]
     assert died
     assert died[0] not in left
@@ -110,7 +136,7 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
 
     def killing(progress, tally):
         look(progress, tally)
-        if tally.flights == 4:
+        if tally.flights == BUNDLE:
             cluster.scheduler.kill()
 
     monkeypatch.setattr(campaign_command._Progress, "look", killing)
@@ -120,7 +146,7 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
         "reported, and --resume FILE continues from them"
     )
     first = re.search(rf"^(\d+) of {len(SEEDS)} flights in", capsys.readouterr().out, re.M)
-    assert 4 <= int(first[1]) < len(SEEDS)
+    assert BUNDLE <= int(first[1]) < len(SEEDS)
     monkeypatch.setattr(campaign_command._Progress, "look", look)
     monkeypatch.setattr(flights.Tally, "__eq__", None)
     monkeypatch.setattr(
@@ -153,50 +179,69 @@ def copied(folder, change):
     ],
 )
 def test_a_worker_that_differs_is_named_before_anything_is_flown(
-    change, words, nothing_flies, monkeypatch, tmp_path, capsys
+    change, words, cluster, nothing_flies, monkeypatch, tmp_path, capsys
 ):
-    with dask_bench() as bench:
-        bench.start_worker()
-        other = bench.start_worker(**copied(tmp_path, change))
-        assert run(monkeypatch, "--scheduler", bench.address) == 2
+    other = cluster.start_worker(**copied(tmp_path, change))
+    assert run(monkeypatch, "--scheduler", cluster.address) == 2
     out, err = capsys.readouterr()
     assert not out
     assert re.fullmatch(rf"campaign: worker {other}: {words}.*\n", err), err
     assert "install the same on both (docs/guide/cluster.md)" in err
 
 
-def test_a_worker_of_two_threads_is_refused(nothing_flies, monkeypatch, capsys):
-    with dask_bench() as bench:
-        other = bench.start_worker("--nthreads", "2")
-        assert run(monkeypatch, "--scheduler", bench.address) == 2
+def test_a_worker_of_two_threads_is_refused(cluster, nothing_flies, monkeypatch, capsys):
+    other = cluster.start_worker("--nthreads", "2")
+    assert run(monkeypatch, "--scheduler", cluster.address) == 2
     told = f"worker {other}: it runs 2 threads: start it with --nthreads 1 --nworkers N"
     assert capsys.readouterr().err == f"campaign: {told}\n"
 
 
-@pytest.mark.parametrize("where", ["worker", "scheduler"])
-def test_one_without_the_code_is_named(where, nothing_flies, monkeypatch, capsys, tmp_path):
+@pytest.fixture
+def without(tmp_path):
+    """An environment without the code."""
     (tmp_path / "chute_ros").mkdir()
     (tmp_path / "chute_ros" / "__init__.py").write_text("")
-    without = {"PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ['PYTHONPATH']}"}
-    with dask_bench(**(without if where == "scheduler" else {})) as bench:
-        worker = bench.start_worker(**(without if where == "worker" else {}))
-        named = worker if where == "worker" else bench.address
-        assert run(monkeypatch, "--scheduler", bench.address) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"campaign: {where} {named}: ModuleNotFoundError")
+    return {"PYTHONPATH": f"{tmp_path}{os.pathsep}{os.environ['PYTHONPATH']}"}
+
+
+def assert_told_what_lacks_the_code(named, told):
+    assert told.startswith(f"campaign: {named}: ModuleNotFoundError")
     assert "No module named 'chute_ros." in told
     assert told.endswith("install the same on both (docs/guide/cluster.md)\n")
 
 
+def test_a_worker_without_the_code_is_named(without, cluster, nothing_flies, monkeypatch, capsys):
+    worker = cluster.start_worker(**without)
+    assert run(monkeypatch, "--scheduler", cluster.address) == 2
+    assert_told_what_lacks_the_code(f"worker {worker}", capsys.readouterr().err)
+
+
+def test_a_scheduler_without_workers_is_told_with_the_remedy_and_then_that_it_lacks_the_code(
+    without, nothing_flies, monkeypatch, capsys
+):
+    with dask_bench(**without) as bench:
+        with monkeypatch.context() as impatient:
+            impatient.setattr(campaign_cluster, "_PATIENCE", 5.0)
+            assert run(monkeypatch, "--scheduler", bench.address) == 2
+        told = capsys.readouterr().err
+        assert told == (
+            f"campaign: the scheduler at {bench.address} has no workers after 5 s: start some "
+            f"with `dask worker {bench.address} --nthreads 1 --nworkers N` "
+            "(docs/guide/cluster.md)\n"
+        )
+        bench.start_worker()
+        assert run(monkeypatch, "--scheduler", bench.address) == 2
+    assert_told_what_lacks_the_code(f"scheduler {bench.address}", capsys.readouterr().err)
+
+
 def test_a_worker_that_comes_later_and_differs_ends_it(cluster, tmp_path):
-    other = []
+    changed, other = copied(tmp_path, "chute_ros/supervisor/core.py"), []
 
     def look(tally):
         if tally.flights == 1:
-            changed = copied(tmp_path, "chute_ros/supervisor/core.py")
+            for process in cluster.workers.values():
+                process.kill()
             other.append(cluster.start_worker(**changed))
-            for address in list(cluster.workers)[:2]:
-                cluster.workers[address].kill()
 
     tally = flights.Tally()
     flown = campaign_cluster.Cluster(cluster.address)
@@ -206,19 +251,8 @@ def test_a_worker_that_comes_later_and_differs_ends_it(cluster, tmp_path):
     assert 1 <= tally.flights < len(SEEDS)
 
 
-def test_a_scheduler_without_workers_is_told_with_the_remedy(nothing_flies, monkeypatch, capsys):
-    monkeypatch.setattr(campaign_cluster, "_PATIENCE", 5.0)
-    with dask_bench() as bench:
-        assert run(monkeypatch, "--scheduler", bench.address) == 2
-    told = capsys.readouterr().err
-    assert told == (
-        f"campaign: the scheduler at {bench.address} has no workers after 5 s: start some with "
-        f"`dask worker {bench.address} --nthreads 1 --nworkers N` (docs/guide/cluster.md)\n"
-    )
-
-
 @contextlib.contextmanager
-def nobody():
+def nobody(_):
     """A port at which nobody listens; held, so that no other test's server comes to it."""
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
@@ -226,25 +260,24 @@ def nobody():
 
 
 @contextlib.contextmanager
-def silent():
+def silent(_):
     """A port at which something listens that never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield server.getsockname()[1]
 
 
 @contextlib.contextmanager
-def worker():
+def worker(cluster):
     """The port of a worker, which answers as well."""
-    with dask_bench() as bench:
-        yield bench.start_worker().rpartition(":")[2]
+    yield next(iter(cluster.workers)).rpartition(":")[2]
 
 
 @pytest.mark.parametrize("port", [nobody, silent, worker])
 def test_where_no_scheduler_is_it_is_told_with_the_remedy(
-    nothing_flies, port, monkeypatch, capsys
+    port, cluster, nothing_flies, monkeypatch, capsys
 ):
     monkeypatch.setattr(campaign_cluster, "_PATIENCE", 1.0)
-    with port() as number:
+    with port(cluster) as number:
         assert run(monkeypatch, "--scheduler", f"tcp://127.0.0.1:{number}") == 2
     told = capsys.readouterr().err
     assert re.fullmatch(
@@ -266,19 +299,11 @@ def test_without_dask_it_is_told_what_to_install(nothing_flies, monkeypatch, cap
 
 def test_what_was_flown_until_ctrl_c_is_written(cluster, tmp_path):
     page = tmp_path / "page.md"
-    command = [
-        *(sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"),
-        *("--scheduler", cluster.address, "--page", str(page), "--failures", str(tmp_path)),
-    ]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        first = process.stderr.readline()
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60.0)
-    assert process.returncode == 130, err
+    options = ("--scheduler", cluster.address, "--page", str(page), "--failures", str(tmp_path))
+    small = f"from chute_ros.tools import campaign_cluster as c; c._BUNDLE = {BUNDLE}"
+    with flying("campaign", *options, changed=small) as process:
+        first, out, err = interrupted(process)
     assert err.splitlines()[-1] == "campaign: interrupted"
-    assert "Traceback" not in err
     flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
     assert flown >= int(first.split()[0]) > 0
     assert f"FLIGHTS={flown} SEED=0`" in page.read_text()
