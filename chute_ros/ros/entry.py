@@ -118,8 +118,15 @@ def _imported(module: str, class_name: str) -> Any:
 
 def _check_arguments(name: str) -> None:
     """What is not for ROS is for nobody: a node has parameters alone."""
+    from rclpy.utilities import remove_ros_args
+
     from chute_ros.ros.parameter_file import not_for_ros
 
+    try:
+        # As it starts it would say the same in two lines.
+        remove_ros_args(sys.argv)
+    except RuntimeError as error:
+        _refused(name, error)
     others = not_for_ros(sys.argv[1:])
     usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
     if "--help" in others or "-h" in others:
