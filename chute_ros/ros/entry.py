@@ -122,11 +122,6 @@ def _check_arguments(name: str) -> None:
 
     from chute_ros.ros.parameter_file import not_for_ros
 
-    try:
-        # As it starts it would say the same in two lines.
-        remove_ros_args(sys.argv)
-    except RuntimeError as error:
-        _refused(name, error)
     others = not_for_ros(sys.argv[1:])
     usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
     if "--help" in others or "-h" in others:
@@ -136,6 +131,11 @@ def _check_arguments(name: str) -> None:
         text = f"unknown argument {others[0]}: the settings of a node follow --ros-args"
         print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
         sys.exit(2)
+    try:
+        # As it starts it would say the same in two lines.
+        remove_ros_args(sys.argv)
+    except RuntimeError as error:
+        _refused(name, error)
 
 
 def _init(name: str) -> None:
