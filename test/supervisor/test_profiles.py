@@ -140,7 +140,7 @@ DEPLOYS = [
         **LEANS,
     ),
     *falls(
-        *("multirotor", "autopilot rebooted in flight", 0.1, REBOOTED),
+        *("multirotor", "autopilot rebooted in flight", 0.4, REBOOTED),
         vertical_speed=(-5.1, -4.9),
         **LEANS,
     ),
@@ -148,7 +148,7 @@ DEPLOYS = [
         case
         for status in (6, 8)
         for case in falls(
-            *("multirotor", "autopilot terminates", 0.2, {"system_status": status}),
+            *("multirotor", "autopilot terminates", 0.4, {"system_status": status}),
             vertical_speed=(-6.1, -5.9),
             **LEANS,
         )
