@@ -17,6 +17,8 @@ from chute_ros.transport.regular_file import read_regular_text
 _MOST_NAMES = 1000
 #: Parameters that ROS gives every node, by what is before their first dot.
 _EVERY_NODE_HAS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+#: How the files begin to which launch_ros writes what a launch file sets.
+_OF_LAUNCH = "launch_params_"
 
 
 def given_in(path: Path, node: str, also: str = "") -> dict[str, Any]:
@@ -111,10 +113,15 @@ def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iter
     for path in reversed(files_of(arguments)):
         here = left & given_in(path, node).keys()
         left -= here
-        parts.insert(0, f"{len(here)} from {path}")
+        parts.insert(0, f"{len(here)} from {_place(path)}")
     if left:
         parts.insert(-1, f"{len(left)} from the command line")
     return f"{len(every)} parameters: {', '.join(parts)}"
+
+
+def _place(path: Path) -> str:
+    """What a person calls it."""
+    return "the launch file" if path.name.startswith(_OF_LAUNCH) else str(path)
 
 
 def _read(path: Path) -> Any:

@@ -51,7 +51,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "fail_motor",
         "Motor fails",
-        "The vehicle falls and tumbles. The supervisor kills the motors, then deploys.",
+        "The vehicle falls and tumbles. The supervisor kills the motors, then deploys. A UPF "
+        "that is armed may release itself first.",
         ((AUTOPILOT, "fail-motor"),),
     ),
     BenchAction(
@@ -168,7 +169,8 @@ ACTIONS: tuple[BenchAction, ...] = (
         "refuse_to_open",
         "Refuse to open",
         "The parachute does not open if it is ordered to. The supervisor orders it again and "
-        "again, then goes to FAULT.",
+        "again, then goes to FAULT. A relay confirms nothing: it is ordered once, and FAULT "
+        "follows also where it opens.",
         (
             (MAVLINK_PARACHUTE, "refuse"),
             (UPF, "refuse"),

@@ -143,6 +143,9 @@ def test_what_a_node_takes_from_where_is_told(tmp_path: Path) -> None:
         f"5 parameters: 1 from {first}, 2 from {second}, 1 from the command line, 1 by default"
     )
     assert taken([], "/a/upf_can", ["a", "b"], []) == "2 parameters: 2 by default"
+    launched = second.rename(tmp_path / "launch_params_x7")
+    told = taken(["--ros-args", "--params-file", str(launched)], "/a/upf_can", ["c"], ["c"])
+    assert told == "1 parameters: 1 from the launch file, 0 by default"
 
 
 @pytest.mark.parametrize(

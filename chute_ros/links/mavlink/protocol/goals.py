@@ -179,6 +179,9 @@ def _why_not_released(parachute: ParachuteTracker, armed_since: float) -> str:
         hints.append(f"armed triggers: {armed}; {need}, which force arms on the way")
     if not parachute.ground_cleared:
         hints.append("its own status does not report GROUND_CLEARED")
+    if armed_since < math.inf and parachute.armed_triggers:
+        now = ", ".join(flag_names(parachute.armed_triggers))
+        hints.append(f"it is ARMED now ({now}): on the ground disarm it")
     return "; ".join(hints)
 
 

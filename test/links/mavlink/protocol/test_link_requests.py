@@ -437,6 +437,13 @@ def test_a_refused_release_names_what_the_parachute_says_of_itself():
     assert "GROUND_CLEARED" not in message
 
 
+def test_of_one_that_force_has_armed_and_that_did_not_release_it_is_said_that_it_is_armed():
+    bench = Bench().hear(CHUTE, heartbeat(), status()).call("deploy", 1, True)
+    bench.at(0.1).hear(CHUTE, ack(TRIGGERS), status(armed=4), ack(RELEASE, d.MAV_RESULT_FAILED))
+    message = bench.at(6.0).end(1).finished.message
+    assert "it is ARMED now (FC): on the ground disarm it" in message
+
+
 PROGRESS = d.MAV_RESULT_IN_PROGRESS
 
 
