@@ -48,6 +48,12 @@ HEARTBEAT_INTERVAL = 0.2
 _OLD = 0.3
 #: The interval is asked for again after so long, s, so often at most for each autopilot.
 _ASK_AGAIN, _MOST_ASKED = 2.0, 3
+#: What its settings mean is said to the ground station so.
+_FOR_THE_PILOT: dict[Severity, int] = {
+    Severity.INFO: dialect.MAV_SEVERITY_INFO,
+    Severity.WARNING: dialect.MAV_SEVERITY_WARNING,
+    Severity.ERROR: dialect.MAV_SEVERITY_CRITICAL,
+}
 
 
 class AutopilotCare:
@@ -148,8 +154,7 @@ class AutopilotCare:
             self._told_at = now
             for severity, text in self._news.news(autopilot.device, self.setup_of(autopilot)):
                 self._devices.notice(severity, text)
-                if severity is Severity.ERROR:
-                    self._announcements.say(text)
+                self._announcements.say(text, _FOR_THE_PILOT[severity])
         if name := settings.due(now):
             ids, encoded = (autopilot.system_id, autopilot.component_id), name.encode()
             self._outbox.send(dialect.MAVLink_param_request_read_message(*ids, encoded, -1), now)

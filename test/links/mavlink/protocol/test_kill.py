@@ -274,6 +274,7 @@ def test_the_way_is_said_once_the_settings_are_read():
     )
     bench.stream(5.0, 0.1, PILOT, copter)
     assert len(bench.notices()) == 1
+    assert bench.texts() == [text], "the pilot reads it, too"
 
 
 @pytest.mark.parametrize(
