@@ -197,6 +197,59 @@ def test_whatever_way_one_estimator_runs_in_a_level_hover_it_ends_no_flight(
     assert teller.story.fired() == []
 
 
+#: What an autopilot may say of itself, truly or not.
+SAYS: tuple[dict[str, Any], ...] = (
+    {},
+    {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND},
+    {"reboot_count": 1, "rebooted_in_flight": True},
+    {"system_status": 6},
+    {"battery_remaining": 0.0},
+)
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("says", SAYS, ids=str)
+@settings(max_examples=5)
+@given(
+    lies=st.sampled_from(["estimator", "accelerometer", "barometer"]),
+    sink=st.sampled_from([0.0, 1.0, 2.0]),
+    pushes=st.lists(st.floats(-9.0, 3.0), min_size=2, max_size=4),
+    leans=st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=4),
+    forces=st.lists(st.floats(0.0, 9.0), min_size=2, max_size=8),
+)
+def test_whatever_one_origin_tells_beside_what_an_autopilot_says_it_ends_no_flight(
+    profile: str,
+    says: dict[str, Any],
+    lies: str,
+    sink: float,
+    pushes: list[float],
+    leans: list[float],
+    forces: list[float],
+) -> None:
+    """Given a level hover or a slow descent: of estimator, accelerometer and barometer one is
+    wrong, in any way. No rule takes it for two signs."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 100.0, true_height=100.0)
+    true_height, error, height, tilt = 100.0, 0.0, 100.0, 3.0
+    for k in range(80):
+        true_height -= EVERY * sink
+        told = {"height": true_height, "vertical_speed": -sink, "tilt": 3.0, "force": 9.8}
+        barometer = true_height
+        error += EVERY * pushes[k * len(pushes) // 80]
+        if lies == "estimator":
+            height += EVERY * (error - sink)
+            tilt = min(max(tilt + EVERY * leans[k * len(leans) // 80], 0.0), 175.0)
+            told |= {"height": height, "vertical_speed": error - sink, "tilt": tilt}
+        elif lies == "accelerometer":
+            told["force"] = forces[k * len(forces) // 80]
+        else:
+            barometer += 0.5 * error * EVERY * k
+        told["vertical_speed"] += teller.noise(0.2)
+        teller.tell(**told, **says, true_height=barometer)
+    assert teller.story.fired() == []
+
+
 @AIRCRAFT
 @pytest.mark.parametrize("gap", [1.5, 3.0, 6.0])
 @pytest.mark.parametrize("drift", [3.0, 5.0])
