@@ -59,7 +59,7 @@ _HOVERS = {
     FELT_FALL: 0.0,
     SPEED_ERROR: 0.0,
     FORCE_ERROR: 0.0,
-    TILT: 0.0,
+    TILT: 3.0,
     "attitude_error": 0.0,
     "sink_beyond_target": 0.0,
     ACCELERATION: 9.81,

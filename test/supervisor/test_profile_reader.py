@@ -276,7 +276,8 @@ def test_a_rule_has_a_name(name: str) -> None:
 @pytest.mark.parametrize(
     ("limit", "told"),
     [
-        ("tilt_deg, below: 180", "tilt_deg 0"),
+        ("tilt_deg, below: 180", "tilt_deg 3"),
+        ("tilt_deg, above: 0", "tilt_deg 3"),
         ("acceleration, above: 0", "acceleration 9.81"),
         ("vertical_speed, above: -399.9", "vertical_speed 0"),
         ("height, above: -499", "height 30"),
