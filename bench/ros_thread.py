@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import threading
 
-import rclpy
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 
 class RosThread:
-    """name, namespace: of the node. There is one in a process; its subclass adds to it before it
-    is started."""
+    """name, namespace: of the node. Its subclass adds to it before it is started."""
 
     def __init__(self, name: str, namespace: str = "") -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self.node = Node(name, namespace=namespace)
-        self._executor = SingleThreadedExecutor()
+        self._context = Context()
+        self._context.init()
+        self.node = Node(name, namespace=namespace, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
 
@@ -27,7 +26,7 @@ class RosThread:
 
     def close(self) -> None:
         """End the thread."""
-        rclpy.try_shutdown()
+        self._context.try_shutdown()
         if self._thread.is_alive():
             self._thread.join()
         self._executor.shutdown()

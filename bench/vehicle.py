@@ -88,7 +88,7 @@ def _measure(namespace: str, children: Processes, chosen: argparse.Namespace) ->
     person.start()
     try:
         begun = time.monotonic()
-        _start(namespace, children, port)
+        start(namespace, children, port)
         _until("READY", lambda: person.stage == person.READY, children)
         result.started = (time.monotonic() - begun) * 1e3
         result.cost, result.said = _cost(children, wire, chosen.cost_seconds)
@@ -104,7 +104,8 @@ def _measure(namespace: str, children: Processes, chosen: argparse.Namespace) ->
     return result
 
 
-def _start(namespace: str, children: Processes, port: int) -> None:
+def start(namespace: str, children: Processes, port: int, mark: str = "") -> None:
+    """Both nodes, whose names among the children end with this mark."""
     limits = f"person stale_after={_STALE_AFTER} lost_after={_LOST_AFTER} regain_after=0.0"
     given = {
         "mavlink_parachute": {"connection": f"udpin:127.0.0.1:{port}"},
@@ -114,7 +115,8 @@ def _start(namespace: str, children: Processes, port: int) -> None:
         },
     }
     for name in NODES:
-        children.start(name, module_of(name), *ros_arguments(namespace, **given[name]))
+        arguments = ros_arguments(namespace, **given[name])
+        children.start(f"{name}{mark}", module_of(name), *arguments)
 
 
 def _until(what: str, holds: Callable[[], bool], children: Processes) -> None:
@@ -143,7 +145,7 @@ def _deploys(wire: VehicleWire, person: Person, children: Processes, count: int)
     times, alone_at = [], 0.0
     for _ in range(count):
         _until("alone", partial(_is_past, alone_at), children)
-        times.append(_deploy(wire, person, children))
+        times.append(deploy(wire, person, children))
         alone_at = time.monotonic() + CommandLimits().late_ack_window
     return times
 
@@ -152,8 +154,8 @@ def _is_past(at: float) -> bool:
     return time.monotonic() > at
 
 
-def _deploy(wire: VehicleWire, person: Person, children: Processes) -> float:
-    """A person calls safety/deploy; until the release is on the wire, with the kill before it."""
+def deploy(wire: VehicleWire, person: Person, children: Processes) -> float:
+    """A person calls safety/deploy; ms until the release is on the wire, the kill before it."""
     _until("READY", lambda: person.stage == person.READY, children)
     wire.releases.clear()
     called = person.deploy()

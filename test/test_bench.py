@@ -19,7 +19,7 @@ KILL_SWITCH, DECODING, TELEMETRY = (
 )
 FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
 FEW += ("--rounds", "2", "--deploys", "2", "--cost-seconds", "1", "--message-batches", "3")
-FEW += ("--executor-requests", "2", "--onlooker-requests", "2")
+FEW += ("--executor-requests", "2", "--onlooker-requests", "2", "--onlooker-deploys", "2")
 #: The sections of docs/evidence/bench.md, and those that have pages of their own.
 KEPT = ("Kill switch", "A vehicle", "Decoding", "Decoding a line", "Through the node")
 ELSEWHERE = ("Executors", "Onlookers")
@@ -180,6 +180,7 @@ def test_all_parts_are_measured_in_one_run(tmp_path):
     kill_switch, vehicle, messages, decoding, telemetry, executors, onlookers = found
     assert re.findall(r"^\| (\w+Executor) \| \d", executors, re.M) == EXECUTORS
     assert len(re.findall(r"^\| (?:kill|answer), .+ ms \|", onlookers, re.M)) == 2 * 2 * 3
+    assert len(re.findall(r"^\| deploy, .+ ms \|", onlookers, re.M)) == 3
     assert check_kill_switch(kill_switch) == 5
     assert check_vehicle(vehicle) == (2, 2)
     assert check_messages(messages) == 3

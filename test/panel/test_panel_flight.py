@@ -84,6 +84,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
     page = open_page(f"{panel.address}/vehicle{rig.namespace}", PHONE, has_touch=True)
     word(page, "BLOCKED")
     expect(page.locator(".part-banner .why")).to_contain_text("mavlink_parachute")
+    picture(page, "phone_blocked.jpg")
     watch_words(page)
     # When the parachute is plugged in, then all of it is there.
     rig.start_parachute()
@@ -91,6 +92,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
     card = page.locator(".part-parachutes")
     for text in ("1/161", "2026-06-19", "serial number SIM-0001", "firmware 0.1.0"):
         expect(card).to_contain_text(text, timeout=PATIENCE)
+    picture(page, "phone_ready.jpg")
     # When the operator logs in and arms, then the page says so, and who.
     log_in(page)
     word(page, "READY")
