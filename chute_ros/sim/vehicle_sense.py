@@ -99,15 +99,12 @@ class VehicleSense(MavlinkDevice):
 
 @contextmanager
 def sensing(
-    address: str | None,
+    address: str,
     system_id: int,
     felt: Callable[[Motion], None],
     released: Callable[[], bool],
 ) -> Iterator[None]:
-    """A VehicleSense at work over the wire of this address; empty or None: there is no vehicle."""
-    if not address:
-        yield
-        return
+    """A VehicleSense at work over the wire of this address."""
     device = VehicleSense(system_id, felt, released)
     loop = WireLoop(device, make_wire(parse_address(address)), lambda events: None)
     loop.start()

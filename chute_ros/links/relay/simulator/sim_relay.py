@@ -24,10 +24,12 @@ def _run() -> None:
     chosen = options.parse_args()
     board = RelayBoard(script_of(chosen.at))
 
-    # Here: without a vehicle the packages of MAVLink are not needed.
-    from chute_ros.sim.vehicle_sense import sensing
+    sense = None
+    if chosen.vehicle:
+        # Here: without a vehicle neither pymavlink nor the dialect is needed.
+        from chute_ros.sim.vehicle_sense import sensing
 
-    sense = sensing(chosen.vehicle, chosen.system_id, lambda motion: None, lambda: board.fired)
+        sense = sensing(chosen.vehicle, chosen.system_id, lambda motion: None, lambda: board.fired)
     run_on_pty(board, chosen, sense)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
+
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
@@ -79,7 +81,6 @@ def _run() -> None:
     from chute_ros.links.upf.simulator.errors import error_places
     from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
     from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
-    from chute_ros.sim.vehicle_sense import sensing
     from chute_ros.transport.data_types import load_data_types
 
     definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
@@ -105,12 +106,17 @@ def _run() -> None:
     if not nodes:
         raise ParameterError("--no-controller and --no-trigger: nothing to simulate")
 
-    sense = sensing(
-        chosen.vehicle,
-        chosen.system_id,
-        lambda motion: setattr(controller, "motion", motion),
-        lambda: trigger.fired,
-    )
+    sense: AbstractContextManager[None] = nullcontext()
+    if chosen.vehicle:
+        # Here: without a vehicle neither pymavlink nor the dialect is needed.
+        from chute_ros.sim.vehicle_sense import sensing
+
+        sense = sensing(
+            chosen.vehicle,
+            chosen.system_id,
+            lambda motion: setattr(controller, "motion", motion),
+            lambda: trigger.fired,
+        )
     run_on_can(UpfBus(nodes, script_of(chosen.at)), chosen, sense)
 
 
