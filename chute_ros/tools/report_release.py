@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 
 from chute_ros.model import DeploymentTrigger, ParachuteStatus, name_of
-from chute_ros.tools.flight_story import FlightStory
+from chute_ros.tools.flight_story import Asked, FlightStory
 from chute_ros.tools.release_orders import MotionThen, Release
-from chute_ros.tools.report_parts import answer_of, cell, listing, number, table, words
+from chute_ros.tools.report_parts import cell, listing, number, table, words
 from chute_ros.tools.timeline import escaped
 
 #: A measurement that is older (s) is not that of the moment.
@@ -47,6 +47,17 @@ def release_of(released: Sequence[Release], story: FlightStory) -> str:
             for one in released
         ),
     )
+
+
+def answer_of(asked: Asked) -> str:
+    """The answer to a request."""
+    if asked.answer is None:
+        return '<span class="dim">no answer</span>'
+    after, finish = asked.answer
+    tone, word = ("good", "success") if finish.success else ("bad", "no success")
+    accepted = ", accepted" if finish.accepted else ""
+    told = f'<b class="{tone}">{word}</b>{accepted} after {after:.3f} s: '
+    return told + escaped(finish.message)
 
 
 def calls_of(story: FlightStory) -> str:

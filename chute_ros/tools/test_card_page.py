@@ -13,8 +13,7 @@ from chute_ros.tools.descent import Descent, descent
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.recording import Recording, utc
 from chute_ros.tools.release_orders import Release
-from chute_ros.tools.report_page import document
-from chute_ros.tools.report_parts import cell, number, section, table, words
+from chute_ros.tools.report_parts import cell, document, number, section, table, words
 from chute_ros.tools.report_release import parachutes_of, release_of
 from chute_ros.tools.timeline import escaped
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,10 +13,14 @@ COMMAND = [sys.executable, "-u", "-m", "chute_ros.tools.conformance"]
 
 
 @contextmanager
-def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A process that is gone afterwards."""
+def started(
+    *arguments: str, environment: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[str]]:
+    """A process that is gone afterwards. environment: None: that of the tests."""
     pipe = subprocess.PIPE
-    one = subprocess.Popen(arguments, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT)
+    one = subprocess.Popen(
+        arguments, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT, env=environment
+    )
     with one:
         try:
             yield one

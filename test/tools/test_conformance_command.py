@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import os
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -234,3 +236,100 @@ def test_a_number_that_cannot_be_is_refused_with_what_can(
 ) -> None:
     _, errors = refused(monkeypatch, capsys, device, option, value)
     assert errors.endswith(f"conformance {device}: error: argument {option}: {told}\n")
+
+
+# -- without ROS --------------------------------------------------------------------------------
+
+#: Makes an import fail as on a machine without ROS, on which the dialect alone was generated.
+NO_ROS = """
+import sys
+
+ROS = ("rclpy", "builtin_interfaces", "rosidl", "ament", "rpyutils", "chute_msgs.msg")
+
+
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith(ROS):
+            raise ImportError(f"no ROS here: {name}")
+
+
+sys.meta_path.insert(0, NoRos())
+"""
+#: Device -> its simulator, the clause that is tried, and the folder of its messages.
+WITHOUT_ROS = {
+    "mavlink": ("chute_ros.links.mavlink.simulator.sim_mavlink_parachute", "request-status", ()),
+    "upf": (
+        "chute_ros.links.upf.simulator.sim_upf",
+        "node-info",
+        ("--dsdl-path", "msg_defs/dsdl/flyfire"),
+    ),
+    "umbilical": (
+        "chute_ros.links.umbilical.simulator.sim_flight_computer",
+        "flash-info",
+        ("--telem-path", "msg_defs/telem"),
+    ),
+}
+
+
+@pytest.fixture
+def without_ros(tmp_path: Path) -> dict[str, str]:
+    """An environment in which nothing of ROS can be imported."""
+    (tmp_path / "sitecustomize.py").write_text(NO_ROS)
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def connections(device: str, folder: Path) -> tuple[list[str], str]:
+    """(options of the simulator, connection of the kit)."""
+    ours, theirs = free_udp_ports(2)
+    if device == "umbilical":
+        return ["--link", str(folder / "tty")], f"serial:{folder / 'tty'}"
+    if device == "upf":
+        return ["--connection", f"mcast:0:{ours}"], f"mcast:0:{ours}"
+    turned = f"udppair:127.0.0.1:{theirs}:127.0.0.1:{ours}"
+    return ["--connection", turned], f"udppair:127.0.0.1:{ours}:127.0.0.1:{theirs}"
+
+
+@pytest.mark.parametrize("device", WITHOUT_ROS)
+def test_a_kit_lists_and_tries_without_ros(
+    device: str, without_ros: Mapping[str, str], tmp_path: Path
+) -> None:
+    module, clause, folder = WITHOUT_ROS[device]
+    with started(*COMMAND, device, "--list", environment=without_ros) as kit:
+        out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (0, "")
+    assert f"\n{clause} " in out
+    told, connection = connections(device, tmp_path)
+    simulator = [sys.executable, "-u", "-m", module, *told, *folder]
+    page = tmp_path / "a.html"
+    options = ["--connection", connection, *folder, "--only", clause, "--html", str(page)]
+    with started(*simulator, environment=without_ros) as simulated:
+        assert simulated.stdout is not None
+        simulated.stdout.readline()
+        with started(*COMMAND, device, *options, environment=without_ros) as kit:
+            out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (0, "")
+    assert f"passed         {clause}" in out
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize(("option", "package"), [("--mcap", "mcap"), ("--junit", "junitparser")])
+def test_what_one_option_alone_needs_is_named(
+    option: str,
+    package: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    right = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == package else right(name)
+    )
+    monkeypatch.setattr(sys, "argv", ["conformance", "mavlink", option, str(tmp_path / "a")])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == (
+        f"conformance: {option}: {package} is not installed: "
+        f"`python3 -m pip install {package}` brings it\n"
+    )

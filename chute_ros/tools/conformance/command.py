@@ -11,6 +11,7 @@ cannot be written; 141: nobody reads on.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import platform
 import queue
@@ -136,7 +137,9 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
         if path is not None:
             require_output(path, kind)
     if chosen.junit:
-        _junit()
+        _require("--junit", "junitparser")
+    if chosen.mcap:
+        _require("--mcap", "mcap")
     if risk is not Risk.NONE:
         _ask(kit, risk)
     session, events = Session(bench, clauses, Allowed(risk, given)), queue.SimpleQueue[Any]()
@@ -171,16 +174,19 @@ def _clauses(kit: Kit, only: Sequence[str]) -> list[Clause[Any]]:
     return [one for one in kit.clauses if not only or one.name in only]
 
 
-def _junit() -> Callable[[Report], str]:
-    # Few machines have what only this needs.
-    try:
-        from chute_ros.tools.conformance.junit import junit
-    except ImportError as error:
+def _require(option: str, package: str) -> None:
+    """ChuteError: the package that only this option needs is not installed, as on few machines."""
+    if importlib.util.find_spec(package) is None:
         raise ChuteError(
-            f"--junit: {error.name} is not installed: "
-            "`python3 -m pip install -r requirements/extra.in` brings it"
-        ) from None
-    return junit
+            f"{option}: {package} is not installed: `python3 -m pip install {package}` brings it"
+        )
+
+
+def _junit(report: Report) -> str:
+    # Here: few machines have what only this needs.
+    from chute_ros.tools.conformance.junit import junit
+
+    return junit(report)
 
 
 def _ask(kit: Kit, risk: Risk) -> None:
@@ -273,7 +279,7 @@ def _line(event: Any) -> str:
 def _write(chosen: argparse.Namespace, report: Report) -> None:
     writers: list[tuple[Path | None, Callable[[Path], object]]] = [
         (chosen.html, lambda path: write_page(path, page(report), HTML)),
-        (chosen.junit, lambda path: write_page(path, _junit()(report), JUNIT)),
+        (chosen.junit, lambda path: write_page(path, _junit(report), JUNIT)),
         (chosen.mcap, lambda path: write_output(path, recording(report), MCAP)),
     ]
     for path, write in writers:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from chute_ros.conformance.clause import Packet, Result, Verdict
 from chute_ros.tools.conformance.report import Report
-from chute_ros.tools.report_page import document
-from chute_ros.tools.report_parts import cell, number, section, table, words
+from chute_ros.tools.report_parts import cell, document, number, section, table, words
 from chute_ros.tools.timeline import escaped
 
 _TONES = {

@@ -6,8 +6,6 @@ import io
 import json
 import re
 
-from mcap.writer import Writer
-
 from chute_ros.tools.conformance.report import Report
 from chute_ros.tools.page_file import Kind
 
@@ -34,6 +32,8 @@ _SCHEMA = {
 
 def recording(report: Report) -> bytes:
     """All traffic, a message a packet, and the report's head as metadata."""
+    from mcap.writer import Writer
+
     file = io.BytesIO()
     writer = Writer(file)
     writer.start(profile="", library=_LIBRARY)

@@ -11,8 +11,7 @@ from chute_ros.tools.judge_log.findings import Rating, Unknown, Verdict, blocked
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.judge_log.sweep import Tried
-from chute_ros.tools.report_page import document
-from chute_ros.tools.report_parts import cell, listing, number, section, table, words
+from chute_ros.tools.report_parts import cell, document, listing, number, section, table, words
 from chute_ros.tools.state_rows import state_rows
 from chute_ros.tools.timeline import close_up, draw, escaped
 from chute_ros.tools.timeline_rows import ACTION_TONES, Curve, Mark, Marks, Row, Window
