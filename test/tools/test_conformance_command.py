@@ -19,6 +19,10 @@ from junitparser import JUnitXml
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+from chute_ros.conformance.clause import ASKS, READS, SOAK
+from chute_ros.conformance.session import Trying
+from chute_ros.links.api import load
+from chute_ros.links.registered import links
 from chute_ros.tools.conformance import command
 from chute_ros.tools.isolation import free_udp_ports
 
@@ -236,6 +240,42 @@ def test_a_number_that_cannot_be_is_refused_with_what_can(
 ) -> None:
     _, errors = refused(monkeypatch, capsys, device, option, value)
     assert errors.endswith(f"conformance {device}: error: argument {option}: {told}\n")
+
+
+KITS = {one.device: load(one.kit) for one in links().values() if one.kit}
+
+
+@pytest.mark.parametrize("device", KITS)
+def test_before_each_step_stands_what_the_device_may_do(device: str) -> None:
+    """In a run of the whole kit, with all that it may do allowed."""
+    clauses = KITS[device].clauses
+    told = {one.name: command.line_of(Trying(one, 1, len(clauses)), ()) for one in clauses}
+    assert {name for name, line in told.items() if not line} == {
+        one.name for one in clauses if one.does in (READS, ASKS) and SOAK not in one.needs
+    }
+    assert all(one.does in told[one.name] for one in clauses if told[one.name])
+
+
+def test_clauses_of_another_kind_of_device_are_counted_in_one_line(tmp_path: Path) -> None:
+    """Given --trigger: they stay in the report."""
+    report = tmp_path / "a.xml"
+    connection = f"mcast:0:{free_udp_ports(1)[0]}"
+    options = ["--connection", connection, "--trigger", "--junit", str(report)]
+    names = ["--only", "node-id", "parameters", "trigger-node-id"]
+    simulator = [sys.executable, "-u", "-m", "chute_ros.links.upf.simulator.sim_upf"]
+    with started(*simulator, "--no-controller", "--connection", connection) as simulated:
+        assert simulated.stdout is not None
+        simulated.stdout.readline()
+        with started(*COMMAND, "upf", *options, *names) as kit:
+            out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (0, "")
+    assert out.splitlines()[:2] == [
+        "found node 34",
+        "  not tried      2 clauses that are of another kind of device",
+    ]
+    assert " node-id" not in out.replace("trigger-node-id", "")
+    (suite,) = JUnitXml.fromfile(str(report))
+    assert [case.name for case in suite] == names[1:]
 
 
 # -- without ROS --------------------------------------------------------------------------------

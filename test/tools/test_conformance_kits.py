@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
-from chute_ros.conformance.clause import SOAK, Clause, Result, Risk, Verdict
+from chute_ros.conformance.clause import ASKS, READS, SOAK, Clause, Result, Risk, Verdict
 from chute_ros.conformance.kit import Kit
 from chute_ros.conformance.session import Allowed, Session
 from chute_ros.conformance.virtual import VirtualLine
@@ -33,3 +35,28 @@ def test_each_clause_has_a_name_of_its_own() -> None:
     for kit in KITS.values():
         names = [one.name for one in kit.clauses]
         assert len(set(names)) == len(names)
+
+
+#: Name and content of what asks a device for what it knows, or keeps the connection.
+ASKING = {
+    # MAV_CMD_REQUEST_MESSAGE, MAV_CMD_GET_MESSAGE_INTERVAL, and a number that is no command.
+    "mavlink": r"COMMAND_(LONG|INT) .*\bcommand=(512|510|31999)\b.*",
+    "upf": r"uavcan\.protocol\.(GetNodeInfo|GetTransportStats) request .*"
+    r"|uavcan\.protocol\.param\.GetSet request .*value={'empty': {}}.*",
+    "umbilical": r"write (<H>|<I>)",
+}
+
+
+@pytest.mark.parametrize(
+    ("device", "clause"),
+    [(device, one) for device, one in ALONE if one.does in (READS, ASKS)],
+    ids=lambda one: one if isinstance(one, str) else one.name,
+)
+def test_a_clause_that_does_more_than_ask_says_what_the_device_may_do(
+    device: str, clause: Clause[object]
+) -> None:
+    sound, bench = KITS[device].simulated("", clause.needs or SOAK)
+    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, clause.needs.split())), sound)
+    line.run()
+    sent = [f"{one.name} {one.text}" for one in bench.traffic if one.sent]
+    assert [one for one in sent if not re.fullmatch(ASKING[device], one)] == []

@@ -24,7 +24,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, TextIO
 
-from chute_ros.conformance.clause import Clause, Result, Risk, Verdict
+from chute_ros.conformance.clause import ASKS, READS, SOAK, Clause, Result, Risk, Verdict
 from chute_ros.conformance.kit import Kit
 from chute_ros.conformance.session import Allowed, Bench, Ended, Found, Session, Trying
 from chute_ros.errors import ChuteError
@@ -147,7 +147,8 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
     # after the last clause its report half written.
     with at_ctrl_c(lambda number, _: events.put(signal.Signals(number)), _ENDS):
         began = time.time_ns()
-        results, found, problem = _tried(session, wire, events)
+        other = [one.name for one in clauses if one.without in given]
+        results, found, problem = _tried(session, wire, events, other)
         begun = datetime.fromtimestamp(began / 1e9, timezone.utc)
         about = {
             "device": found or "not found",
@@ -200,9 +201,10 @@ def _ask(kit: Kit, risk: Risk) -> None:
 
 
 def _tried(
-    session: Session[Bench], wire: Any, events: queue.SimpleQueue[Any]
+    session: Session[Bench], wire: Any, events: queue.SimpleQueue[Any], other: Sequence[str]
 ) -> tuple[list[Result], str, str]:
-    """(results, who was found, why it is not whole)."""
+    """(results, who was found, why it is not whole). other: clauses of another kind of device,
+    which are counted and not told one by one."""
 
     def deliver(many: list[Any]) -> None:
         for one in many:
@@ -237,7 +239,7 @@ def _tried(
                 abort(event.text)
             elif isinstance(event, WireTrouble) and event.text:
                 _say(f"conformance: {plain(event.text)}", sys.stderr)
-            if (line := _line(event)) and not _say(line):
+            if (line := line_of(event, other)) and not _say(line):
                 abort(_UNREAD)
     finally:
         loop.stop()
@@ -264,16 +266,22 @@ def _next(events: queue.SimpleQueue[Any]) -> Any:
         return None
 
 
-def _line(event: Any) -> str:
+def line_of(event: Any, other: Sequence[str]) -> str:
     """What is told of it; empty: nothing."""
     if isinstance(event, Found):
-        return f"found {plain(event.text)}"
-    if isinstance(event, Trying) and (event.clause.risk is not Risk.NONE or event.clause.needs):
+        left_out = f"\n  not tried      {len(other)} clauses that are of another kind of device"
+        return f"found {plain(event.text)}{left_out if other else ''}"
+    if isinstance(event, Trying) and _is_told(event.clause):
         return f"  [{event.number}/{event.of}] {event.clause.name}: {event.clause.does}"
-    if isinstance(event, Result):
+    if isinstance(event, Result) and event.clause.name not in other:
         name, why = event.clause.name, plain(event.why)
         return f"  {_MARKS[event.verdict]:14s} {name:20s} {why}"
     return ""
+
+
+def _is_told(clause: Clause[Any]) -> bool:
+    """Before it is tried: the device may do something, or nothing is told for long."""
+    return clause.does not in (READS, ASKS) or SOAK in clause.needs
 
 
 def _write(chosen: argparse.Namespace, report: Report) -> None:

@@ -28,6 +28,7 @@ _OTHER_SENDER, _NOBODY = 190, 77
 _NOISE = bytes(byte for byte in range(256) if byte not in (0xFD, 0xFE)) * 4
 #: So many frames of ours are lost in a row: the number of a frame is one byte.
 _LOST = (1, 7, 128)
+_SPOILT = "it gets bytes that it must leave alone"
 KEY = "--signing-key-file"
 
 
@@ -258,9 +259,9 @@ CLAUSES: tuple[MavlinkClause, ...] = (
     _frames("doubled-frame", "a frame that comes twice does no harm", _doubled),
     _frames("lost-frames", "frames that are lost before it do no harm", _lost),
     _frames("reordered-frames", "frames that overtake each other are both taken", _reordered),
-    _frames("noise", "bytes that are no frame do no harm", _noise),
-    _frames("damaged-frame", "a frame with a wrong checksum is not taken", _damaged),
-    _frames("cut-frame", "half a frame does no harm to the next one", _cut),
+    _frames("noise", "bytes that are no frame do no harm", _noise, _SPOILT),
+    _frames("damaged-frame", "a frame with a wrong checksum is not taken", _damaged, _SPOILT),
+    _frames("cut-frame", "half a frame does no harm to the next one", _cut, _SPOILT),
     _frames(
         "mavlink-2",
         "it sends MAVLink 2: PARACHUTE_STATUS has no number in MAVLink 1",

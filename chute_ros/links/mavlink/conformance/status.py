@@ -181,7 +181,7 @@ CLAUSES = (
         "interval-unknown",
         "an interval of a message that it does not have is refused",
         _interval_unknown,
-        ASKS,
+        "it must not, but it may send a message that it does not send now",
     ),
     _told("boot-time", "time_boot_ms is the time since its start, ms", _boot_time, ASKS),
     _errors(

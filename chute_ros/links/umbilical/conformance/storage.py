@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from chute_ros.conformance.clause import ASKS, READS, Trial, Wait, failed, not_tried
+from chute_ros.conformance.clause import ASKS, Trial, Wait, failed, not_tried
 from chute_ros.links.umbilical.conformance.bench import (
     BOOT,
     DUMP,
@@ -222,8 +222,8 @@ CLAUSES: tuple[UmbilicalClause, ...] = (
     _stores("flash-info", "<I> tells about the flash", _flash_info, ASKS),
     _stores("dump-fram", "<f> dumps the FRAM", _dump_fram, _DUMPS),
     _stores("dump-flash", "<G> dumps the flash", _dump_flash, _DUMPS),
-    _tells("dump-interrupts", "a dump of the flash interrupts $TELEM", _interrupts, READS),
-    _tells("dump-resumes", "after the dump $TELEM goes on", _resumes, READS),
+    _tells("dump-interrupts", "a dump of the flash interrupts $TELEM", _interrupts, _DUMPS),
+    _tells("dump-resumes", "after the dump $TELEM goes on", _resumes, _DUMPS),
     _stores(
         "reboot", "<R> reboots it, into Startup", _restart, _RESTARTS, needs=REBOOT, restarts=True
     ),

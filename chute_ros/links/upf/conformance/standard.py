@@ -436,7 +436,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _SETS,
     ),
     clause(_PARAMETERS, "parameter-range", "what cannot be is refused", _range, _SETS),
-    clause(_STANDARD, "opcode-save", "ExecuteOpcode saves", _opcode),
+    clause(_STANDARD, "opcode-save", "ExecuteOpcode saves", _opcode, "it saves its parameters"),
     clause(
         _STANDARD,
         "restart-magic",
