@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -57,6 +57,8 @@ class RecordingBench(Generic[HeardT]):
         self.traffic: list[Packet] = []
         self.heard: list[HeardT] = []
         self.watched: list[HeardT] = []
+        #: What the clause that is tried has judged of what came before: it proves its verdict.
+        self.looked_at: list[Packet] = []
         #: How often the device was seen to start anew.
         self.starts = 0
         self._began = self._up = math.nan
@@ -92,11 +94,12 @@ class RecordingBench(Generic[HeardT]):
         self.watched = [one for one in self.heard if one.at >= began]
         return ""
 
-    def watch_once(self, seconds: float) -> Trial:
+    def watch_once(self, seconds: float, *kinds: str) -> Trial:
         """The same, unless something was watched before: for a clause that looks at what another
-        one has watched, and may be tried without it."""
+        one has watched (of these kinds; none: all), and may be tried without it."""
         if not self.watched:
             yield from self.watch(seconds)
+        self.look_at(one for one in self.watched if not kinds or one.kind in kinds)
         return ""
 
     def watch_on(self, seconds: float) -> Trial:
@@ -111,6 +114,12 @@ class RecordingBench(Generic[HeardT]):
         found = first_of(self.heard, len(self.heard), lambda one: one.kind == kind and fits(one))
         yield Wait(self.now + within, found)
         return found()
+
+    def look_at(self, heard: Iterable[HeardT]) -> list[HeardT]:
+        """These, which the clause that is tried judges, and which may have come before it."""
+        every = list(heard)
+        self.looked_at += [one.packet for one in every]
+        return every
 
     def packets(self, *kinds: str) -> Sequence[Packet]:
         """Of what was watched, those of these kinds."""

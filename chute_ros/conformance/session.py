@@ -26,6 +26,8 @@ class Bench(Protocol):
     #: When the device was heard last, monotonic s.
     heard_at: float
     traffic: list[Packet]
+    #: What the clause that is tried has judged of what came before.
+    looked_at: list[Packet]
     #: How often it was seen to start anew.
     starts: int
 
@@ -170,15 +172,22 @@ class Session(Generic[BenchT]):
             before = f" as {clause.name} was tried"
             self._events.append(Trying(clause, number, len(self._clauses)))
             began, first = self.bench.now, len(self.bench.traffic)
+            self.bench.looked_at = []
             verdict, why, proof = yield from self._tried(clause)
             restarted = self.bench.starts > starts and not clause.restarts
             if restarted and verdict is not Verdict.FAILED:
                 verdict, why = Verdict.FAILED, f"it started anew meanwhile ({why})"
             starts = self.bench.starts
-            shown = proof or tuple(self.bench.traffic[first:])
+            shown = proof or self._judged(first)
             took = self.bench.now - began
             self._events.append(Result(clause, verdict, why, shown, took))
         yield from self._end(problem)
+
+    def _judged(self, first: int) -> tuple[Packet, ...]:
+        """What the trial has looked at of before, and its own traffic, which begins here."""
+        own = self.bench.traffic[first:]
+        known = {id(one) for one in own}
+        return (*(one for one in self.bench.looked_at if id(one) not in known), *own)
 
     def _silent(self) -> Generator[Wait, bool, bool]:
         """Nothing comes of it any more, not even after a while: the rest would prove nothing."""

@@ -29,6 +29,27 @@ def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     line.run()
     (result,) = (one for one in line.events if isinstance(one, Result))
     assert result.verdict in (Verdict.PASSED, Verdict.NOT_TRIED), result.why
+    assert result.proof or result.verdict is Verdict.NOT_TRIED
+
+
+@pytest.mark.parametrize(
+    ("device", "needs"),
+    [
+        *((device, SOAK) for device in KITS),
+        *(("upf", needs) for needs in ("--dna", "--trigger --soak", "--trigger --dna")),
+        *(("umbilical", needs) for needs in ("--reboot", "--wipe")),
+        ("mavlink", "--signing-key-file"),
+    ],
+)
+def test_each_clause_that_passes_has_packets_that_prove_it(device: str, needs: str) -> None:
+    sound, bench = KITS[device].simulated("", needs)
+    allowed = Allowed(Risk.FIRES, needs.split())
+    line = VirtualLine(Session(bench, KITS[device].clauses, allowed), sound)
+    line.run()
+    passed = [one for one in line.events if isinstance(one, Result)]
+    passed = [one for one in passed if one.verdict is Verdict.PASSED]
+    assert len(passed) > 20
+    assert [one.clause.name for one in passed if not one.proof] == []
 
 
 def test_each_clause_has_a_name_of_its_own() -> None:

@@ -83,7 +83,9 @@ def test_each_clause_has_a_way_to_be_broken() -> None:
 def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
     line = simulated(name)
     assert of(line, Verdict.FAILED) == [name]
-    assert results(line)[name].why
+    result = results(line)[name]
+    assert result.why
+    assert result.proof, "packets that show it"
 
 
 # -- whatever it is told -------------------------------------------------------------------------

@@ -23,7 +23,7 @@ _FOUND_WITHIN = 10.0
 ANSWER = 1.0
 TRIES = 3
 #: A status comes by its stream at the latest, s.
-_STATUS_WITHIN = 3.0
+STATUS_WITHIN = 3.0
 #: Whose commands these are: an onboard computer.
 US = 191
 _ACTIONS = (dialect.PARACHUTE_DISABLE, dialect.PARACHUTE_ENABLE)
@@ -261,9 +261,9 @@ class MavlinkBench(RecordingBench[Heard]):
         """A PARACHUTE_STATUS of now (Heard), asked for, or as it is streamed."""
         kind = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
         self.send(self.command_long(dialect.MAV_CMD_REQUEST_MESSAGE, kind))
-        status = yield from self.wait_for("PARACHUTE_STATUS", _STATUS_WITHIN)
+        status = yield from self.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
         if status is None:
-            raise failed(f"no PARACHUTE_STATUS within {_STATUS_WITHIN:g} s")
+            raise failed(f"no PARACHUTE_STATUS within {STATUS_WITHIN:g} s")
         return status
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from chute_ros.conformance.clause import READS, Trial, failed, not_supported
+from chute_ros.conformance.clause import READS, Trial, failed, not_supported, not_tried
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench, entry_name, refused, result_of
 from chute_ros.links.mavlink.conformance.document import HEARTBEAT, PARACHUTE, of
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -36,7 +36,7 @@ def nominal(bench: MavlinkBench, kind: str) -> str:
 
 
 def _heartbeat_type(bench: MavlinkBench) -> Trial:
-    yield from bench.watch_once(WATCHED)
+    yield from bench.watch_once(WATCHED, "HEARTBEAT")
     beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
     kinds = {one.message.type for one in beats}
     if kinds != {dialect.MAV_TYPE_PARACHUTE}:
@@ -47,10 +47,11 @@ def _heartbeat_type(bench: MavlinkBench) -> Trial:
 
 
 def _heartbeat_fields(bench: MavlinkBench) -> Trial:
-    yield from bench.watch_once(WATCHED)
-    for one in bench.watched:
-        if one.kind != "HEARTBEAT":
-            continue
+    yield from bench.watch_once(WATCHED, "HEARTBEAT")
+    beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
+    if not beats:
+        raise not_tried("no HEARTBEAT came")
+    for one in beats:
         wrong = []
         if one.message.autopilot != dialect.MAV_AUTOPILOT_INVALID:
             wrong.append(f"autopilot is {one.message.autopilot} (need MAV_AUTOPILOT_INVALID, 8)")
@@ -65,6 +66,7 @@ def _heartbeat_fields(bench: MavlinkBench) -> Trial:
 
 def _component_id(bench: MavlinkBench) -> Trial:
     yield from ()
+    bench.look_at(bench.heard[-1:])
     if bench.component in (0, dialect.MAV_COMP_ID_AUTOPILOT1):
         raise failed(f"its component id is {bench.component}, which is not its own")
     if bench.component != dialect.MAV_COMP_ID_PARACHUTE:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import Any
 
-from chute_ros.conformance.clause import ASKS, READS, Trial, failed, not_supported
-from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, refused, result_of
+from chute_ros.conformance.clause import ASKS, READS, Trial, failed, not_supported, not_tried
+from chute_ros.links.mavlink.conformance.bench import (
+    STATUS_WITHIN,
+    MavlinkBench,
+    refused,
+    result_of,
+)
 from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import PARACHUTE, of
 from chute_ros.links.mavlink.protocol.parachute import packed_date
@@ -20,12 +25,18 @@ _FASTER, _AWAITED = 200_000, 6
 _CLOCK, _CLOCK_LEAST = 0.05, 0.1
 
 
-def _statuses(bench: MavlinkBench) -> Iterator[Heard]:
-    return (one for one in bench.heard if one.kind == "PARACHUTE_STATUS")
+def _statuses(bench: MavlinkBench) -> Any:
+    """All (Heard) that came so far, or the first that comes."""
+    if not any(one.kind == "PARACHUTE_STATUS" for one in bench.heard):
+        yield from bench.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
+    told = bench.look_at(one for one in bench.heard if one.kind == "PARACHUTE_STATUS")
+    if not told:
+        raise not_tried("no PARACHUTE_STATUS came")
+    return told
 
 
 def _rate(bench: MavlinkBench) -> Trial:
-    yield from bench.watch_once(WATCHED)
+    yield from bench.watch_once(WATCHED, "PARACHUTE_STATUS")
     return nominal(bench, "PARACHUTE_STATUS")
 
 
@@ -108,8 +119,7 @@ def _boot_time(bench: MavlinkBench) -> Trial:
 
 
 def _error_flags(bench: MavlinkBench) -> Trial:
-    yield from ()
-    for one in _statuses(bench):
+    for one in (yield from _statuses(bench)):
         flags = one.message.error_status
         if flags & ~int(sum(ErrorFlags)):
             raise failed(f"error_status is {flags:#x}: bits beyond 20", [one.packet])
@@ -119,8 +129,7 @@ def _error_flags(bench: MavlinkBench) -> Trial:
 
 
 def _safety_flags(bench: MavlinkBench) -> Trial:
-    yield from ()
-    for one in _statuses(bench):
+    for one in (yield from _statuses(bench)):
         flags = one.message.safety_status
         if flags & ~int(sum(SafetyFlags)):
             raise failed(f"safety_status is {flags:#x}: bits beyond 2", [one.packet])
@@ -128,8 +137,7 @@ def _safety_flags(bench: MavlinkBench) -> Trial:
 
 
 def _ground(bench: MavlinkBench) -> Trial:
-    yield from ()
-    for one in _statuses(bench):
+    for one in (yield from _statuses(bench)):
         both = SafetyFlags.GROUND_CLEARED | SafetyFlags.ON_GROUND
         if one.message.safety_status & both == both:
             raise failed("it says GROUND_CLEARED and ON_GROUND at once", [one.packet])
@@ -137,8 +145,7 @@ def _ground(bench: MavlinkBench) -> Trial:
 
 
 def _deployment(bench: MavlinkBench) -> Trial:
-    yield from ()
-    for one in _statuses(bench):
+    for one in (yield from _statuses(bench)):
         if one.message.deployment_status not in DeploymentTrigger._value2member_map_:
             told = one.message.deployment_status
             raise failed(f"deployment_status is {told}, which is no trigger", [one.packet])
@@ -146,9 +153,8 @@ def _deployment(bench: MavlinkBench) -> Trial:
 
 
 def _date(bench: MavlinkBench) -> Trial:
-    yield from ()
     told = ""
-    for one in _statuses(bench):
+    for one in (yield from _statuses(bench)):
         told, wrong = packed_date(one.message.parachute_packed_date)
         if wrong:
             raise failed(wrong, [one.packet])

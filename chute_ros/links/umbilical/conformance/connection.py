@@ -93,6 +93,7 @@ def _unheard(bench: UmbilicalBench) -> Any:
         finally:
             bench.beats = True
         yield from bench.watch_on(SETTLES)
+    bench.look_at(bench.kept["unheard"].lines)
     return bench.kept["unheard"]
 
 

@@ -70,7 +70,7 @@ def _dumped(bench: UmbilicalBench) -> Any:
     """All that comes of a dump of the flash, which is the same for all clauses."""
     if "dumped" not in bench.kept:
         bench.kept["dumped"] = yield from _worked(bench, "dump_flash", _SILENCE)
-    return bench.kept["dumped"].lines
+    return bench.look_at(bench.kept["dumped"].lines)
 
 
 def _stored(lines: Sequence[HeardLine]) -> int:

@@ -48,6 +48,7 @@ def _listened(bench: UmbilicalBench) -> Any:
     """A while of listening (Watch), which is the same for all clauses."""
     if "listened" not in bench.kept:
         yield from bench.watch_as("listened", _WATCHED)
+    bench.look_at(bench.kept["listened"].lines)
     return bench.kept["listened"]
 
 

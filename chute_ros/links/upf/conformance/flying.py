@@ -190,6 +190,7 @@ def _kill_first(bench: UpfBench) -> Trial:
     if bench.deployed_from < 0:
         raise not_tried("it was not deployed")
     for one in bench.every[bench.deployed_from :]:
+        bench.look_at([one])
         asks = one.kind == names.VEHICLE_SERVICE
         if asks and bench.definitions.type_name(one.kind, one.values) == "TYPE_KILLSWITCH":
             return "asked before"

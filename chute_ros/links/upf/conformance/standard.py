@@ -81,7 +81,7 @@ def _node_status(bench: UpfBench) -> Trial:
 
 
 def _node_mode(bench: UpfBench) -> Trial:
-    yield from bench.watch_once(WATCHED)
+    yield from bench.watch_once(WATCHED, NODE_STATUS)
     if not (told := _node_statuses(bench)):
         raise not_tried("no NodeStatus came")
     # It may tell its state before the NodeStatus that goes with it.
@@ -120,7 +120,7 @@ def _statistics(bench: UpfBench) -> Trial:
 
 
 def _uptime(bench: UpfBench) -> Trial:
-    yield from bench.watch_once(WATCHED)
+    yield from bench.watch_once(WATCHED, NODE_STATUS)
     told = _node_statuses(bench)
     if len(told) < 2:
         raise not_tried("NodeStatus came too seldom")
@@ -137,7 +137,7 @@ def _status_interval(bench: UpfBench) -> Trial:
     told = yield from bench.value(p.PARACHUTE_STATUS_INTERVAL)
     if not isinstance(told, (int, float)) or isinstance(told, bool):
         raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
-    yield from bench.watch_once(WATCHED)
+    yield from bench.watch_once(WATCHED, names.PARACHUTE_STATUS)
     mean = _mean(bench, names.PARACHUTE_STATUS)
     if abs(mean - told / 1000.0) > max(_SHARE * told / 1000.0, _LEAST):
         packets = bench.packets(names.PARACHUTE_STATUS)
@@ -148,7 +148,7 @@ def _status_interval(bench: UpfBench) -> Trial:
 def state_known(bench: UpfBench) -> Trial:
     """All that it has told so far."""
     yield from ()
-    told = [one for one in bench.heard if one.kind == bench.device.status]
+    told = bench.look_at(one for one in bench.heard if one.kind == bench.device.status)
     if any("state" not in one.values for one in told):
         raise not_tried("the data types have no state of it")
     named = {bench.definitions.state_name(one.kind, one.values): one for one in told}
@@ -323,18 +323,16 @@ def _releases_when_ready(bench: UpfBench) -> Trial:
 def _asked(bench: UpfBench, what: str, state: ParachuteState) -> str:
     service = names.VEHICLE_SERVICE
     number = bench.definitions.state_number(ParachuteState.NOT_READY)
-    statuses = [one for one in bench.watched if one.kind == names.PARACHUTE_STATUS]
-    if not any(one.values["state"] == number for one in statuses):
+    kinds = (service, names.PARACHUTE_STATUS)
+    told = bench.look_at(one for one in bench.watched if one.kind in kinds)
+    if not any(one.values["state"] == number for one in told if one.kind != service):
         raise not_tried("it was not seen to start anew")
     asked = [
-        bench.definitions.type_name(service, one.values)
-        for one in bench.watched
-        if one.kind == service
+        bench.definitions.type_name(service, one.values) for one in told if one.kind == service
     ]
     if what not in asked:
-        told = ", ".join(asked) or "nothing"
-        packets = bench.packets(service, names.PARACHUTE_STATUS)[:20]
-        raise failed(f"as it became {state.name} it asked the vehicle for {told}", packets)
+        things = ", ".join(asked) or "nothing"
+        raise failed(f"as it became {state.name} it asked the vehicle for {things}")
     return f"asked as it became {state.name}"
 
 

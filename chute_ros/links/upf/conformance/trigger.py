@@ -191,7 +191,7 @@ def _launch(bench: UpfBench) -> Trial:
 def _is_launched(bench: UpfBench) -> Trial:
     """Not the other way: it has fired, whatever its state is."""
     yield from ()
-    told = [one for one in _statuses(bench, 0) if _fired(bench, one)]
+    told = bench.look_at(one for one in _statuses(bench, 0) if _fired(bench, one))
     if not told:
         raise not_tried("it was not seen to fire")
     if "is_launched" not in told[0].values:
