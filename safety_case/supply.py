@@ -14,10 +14,14 @@ from typing import Any
 
 import yaml
 
+from chute_ros.ros.own_version import own_version
 from safety_case.documents import FOLDER, TOOLS, list_table, plain, write_made
 
 _COPYLEFT = re.compile(r"\b(?:A|L)?GPL|MPL|EPL", re.IGNORECASE)
-_INTRODUCTION = """
+_INTRODUCTION = f"""
+This product is chute_ros {own_version()}: its number, and a hash of its Python files. Its nodes
+tell the same in their diagnostics; each test card and each report of the conformance kit has it.
+
 The packages of the environment that ``make`` sets up, as they are installed. All of it, for
 machines: ``sbom.cdx.json`` beside these pages (CycloneDX).
 """

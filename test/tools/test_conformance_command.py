@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -19,10 +20,12 @@ from junitparser import JUnitXml
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
+import chute_ros
 from chute_ros.conformance.clause import ASKS, READS, SOAK
 from chute_ros.conformance.session import Trying
 from chute_ros.links.api import load
 from chute_ros.links.registered import links
+from chute_ros.ros.own_version import hash_of, own_version
 from chute_ros.tools.conformance import command
 from chute_ros.tools.isolation import free_udp_ports
 
@@ -73,6 +76,11 @@ def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
         ("request-status", True),
         ("unknown-command", True),
     ]
+    about = {one.name: one.value for one in suite.properties()}
+    assert about["vendor name"] == "chute_ros"
+    assert about["model name"] == "simulated parachute"
+    assert about["serial number"] == "SIM-0001"
+    assert about["kit"] == f"chute_ros {own_version()}"
     with traffic.open("rb") as file:
         packets = [json.loads(one.data) for *_, one in make_reader(file).iter_messages()]
     assert {"HEARTBEAT", "COMMAND_LONG", "COMMAND_ACK"} <= {one["name"] for one in packets}
@@ -243,6 +251,19 @@ def test_a_number_that_cannot_be_is_refused_with_what_can(
 
 
 KITS = {one.device: load(one.kit) for one in links().values() if one.kit}
+
+
+def test_the_version_of_the_kit_is_another_if_a_file_is(tmp_path: Path) -> None:
+    """Given two commits of one number."""
+    number, plus, files = own_version().partition("+")
+    assert (number, plus) == (version("chute_ros"), "+")
+    assert files == hash_of(Path(chute_ros.__file__).parent)
+    before = hash_of(tmp_path)
+    (tmp_path / "part").mkdir()
+    (tmp_path / "part" / "a.py").write_text("A = 1\n")
+    assert len({before, files, hash_of(tmp_path)}) == 3
+    (tmp_path / "part" / "a.py").rename(tmp_path / "a.py")
+    assert hash_of(tmp_path) != before
 
 
 @pytest.mark.parametrize("device", KITS)

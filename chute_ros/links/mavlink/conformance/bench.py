@@ -185,6 +185,11 @@ class MavlinkBench(RecordingBench[Heard]):
             one for one in self._every if (one.frame.system_id, one.frame.component_id) == device
         ]
         self.heard_at = self.now
+        # For each report, whichever clauses are tried.
+        information = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
+        answer = yield from self.command(dialect.MAV_CMD_REQUEST_MESSAGE, information, tries=1)
+        if answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED:
+            yield from self.wait_for("COMPONENT_INFORMATION_BASIC", ANSWER)
         return f"{self.system}/{self.component}"
 
     def _device(self) -> tuple[int, int] | None:
