@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 from chute_ros.errors import SigningKeyError
 
-KEY_BYTES = 32
+KEY_BYTES, SIGNATURE_BYTES = 32, 6
 #: Unix time (s) of time stamp 0.
 EPOCH_2015 = 1420070400
 UNITS_PER_SECOND = 100_000
@@ -75,6 +75,11 @@ def key_from_text(text: bytes, name: str) -> bytes:
     )
 
 
+def signature_of(key: bytes, unsigned: bytes) -> bytes:
+    """The last bytes of a signed frame. unsigned: all that stands before them."""
+    return hashlib.sha256(key + unsigned).digest()[:SIGNATURE_BYTES]
+
+
 class SigningClock:
     """Signing time from monotonic time, so that a step of the wall clock does not stop the link.
 
@@ -123,8 +128,8 @@ class Verifier:
         """Why the frame in raw is refused; empty: it is good."""
         if not signed:
             return "" if message_id in UNSIGNED_ALLOWED else UNSIGNED
-        digest = hashlib.sha256(self._key + raw[:-6]).digest()[:6]
-        if not hmac.compare_digest(digest, raw[-6:]):
+        right = signature_of(self._key, raw[:-SIGNATURE_BYTES])
+        if not hmac.compare_digest(right, raw[-SIGNATURE_BYTES:]):
             return WRONG_SIGNATURE
         timestamp = int.from_bytes(raw[_TIMESTAMP], "little")
         stream = (raw[5], raw[6], raw[_LINK_ID])

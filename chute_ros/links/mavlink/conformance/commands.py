@@ -16,6 +16,7 @@ from chute_ros.links.mavlink.conformance.document import (
     of,
 )
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.signing import KEY_BYTES, SIGNATURE_BYTES, signature_of
 
 _REQUEST, _STATUS = dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
 #: A number of MAV_CMD that nobody gave away.
@@ -29,6 +30,8 @@ _NOISE = bytes(byte for byte in range(256) if byte not in (0xFD, 0xFE)) * 4
 #: So many frames of ours are lost in a row: the number of a frame is one byte.
 _LOST = (1, 7, 128)
 _SPOILT = "it gets bytes that it must leave alone"
+#: That of nobody.
+_ANOTHER_KEY = bytes(KEY_BYTES)
 KEY = "--signing-key-file"
 
 
@@ -214,6 +217,30 @@ def _unsigned(bench: MavlinkBench) -> Trial:
     return (yield from _silence(bench, "an unsigned command is carried out although it has a key"))
 
 
+def _wrong_key(bench: MavlinkBench) -> Trial:
+    def sign_otherwise(frame: bytes) -> Iterable[bytes]:
+        unsigned = frame[:-SIGNATURE_BYTES]
+        return (unsigned + signature_of(_ANOTHER_KEY, unsigned),)
+
+    bench.send(bench.command_long(_REQUEST, _STATUS), change=sign_otherwise)
+    return (yield from _silence(bench, "a command that is signed with another key is carried out"))
+
+
+def _replayed(bench: MavlinkBench) -> Trial:
+    frames: list[bytes] = []
+
+    def keep(frame: bytes) -> Iterable[bytes]:
+        frames.append(frame)
+        return (frame,)
+
+    command = bench.command_long(_REQUEST, _STATUS)
+    bench.send(command, change=keep)
+    if (yield from bench.answer(_REQUEST)) is None:
+        raise not_tried("a signed command is not answered")
+    bench.send(command, change=lambda frame: frames)
+    return (yield from _silence(bench, "a signed command that was recorded is carried out again"))
+
+
 def _signed(bench: MavlinkBench) -> Trial:
     since = len(bench.heard)
     if (yield from bench.command(_REQUEST, _STATUS)) is None:
@@ -272,6 +299,18 @@ CLAUSES: tuple[MavlinkClause, ...] = (
     _frames("sequence", "its frames are numbered one after the other", _sequence, READS),
     of(SIGNING, "Accepting signed packets")(
         "unsigned-refused", "with a key unsigned commands are refused", _unsigned, needs=KEY
+    ),
+    of(SIGNING, "Accepting signed packets")(
+        "wrong-key-refused",
+        "a command that is signed with another key is refused",
+        _wrong_key,
+        needs=KEY,
+    ),
+    of(SIGNING, "Accepting signed packets")(
+        "replay-refused",
+        "a signed command whose timestamp is not newer than the last one's is refused",
+        _replayed,
+        needs=KEY,
     ),
     of(SIGNING, "Signing packets")(
         "signed-answers", "with a key its answers are signed", _signed, needs=KEY

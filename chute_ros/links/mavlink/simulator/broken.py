@@ -11,7 +11,13 @@ from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, 
 from chute_ros.model import DeploymentTrigger, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameEncoder
-from chute_ros.protocol.mavlink.signing import Signer, Verifier
+from chute_ros.protocol.mavlink.signing import (
+    REPLAYED,
+    UNSIGNED,
+    WRONG_SIGNATURE,
+    Signer,
+    Verifier,
+)
 from chute_ros.sim.mavlink_device import Params
 
 _BEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
@@ -28,6 +34,25 @@ _NUMBER = slice(10 + 28, 10 + 30)
 _AFTER_DOUBLED, _AFTER_LOST, _AFTER_NOISE, _AFTER_CUT, _AFTER_V1 = 0.9, 2.9, 3.0, 3.3, 4.1
 #: It falls silent this long after its start, for so long, s.
 _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
+
+
+#: Clause -> the refusal of a frame that is overlooked.
+_OVERLOOKED = {
+    "unsigned-refused": UNSIGNED,
+    "wrong-key-refused": WRONG_SIGNATURE,
+    "replay-refused": REPLAYED,
+}
+
+
+class _Careless(Verifier):
+    """A verifier that overlooks one cause to refuse a frame."""
+
+    def __init__(self, right: Verifier, overlooks: str) -> None:
+        self._right, self._overlooks = right, overlooks
+
+    def refusal(self, raw: bytes, signed: bool, message_id: int, now: float) -> str:
+        why = self._right.refusal(raw, signed, message_id, now)
+        return "" if why == self._overlooks else why
 
 
 class BrokenParachute(ParachuteDevice):
@@ -147,12 +172,12 @@ class BrokenParachute(ParachuteDevice):
         return min((at for at, _ in self._later), default=math.inf)
 
     def sign(self, signer: Signer, verifier: Verifier) -> None:
-        encoder, checks = self.encoder, self.verifier
+        encoder = self.encoder
         super().sign(signer, verifier)
         if self._breaks == "signed-answers":
             self.encoder = encoder
-        elif self._breaks == "unsigned-refused":
-            self.verifier = checks
+        elif self._breaks in _OVERLOOKED:
+            self.verifier = _Careless(verifier, _OVERLOOKED[self._breaks])
 
 
 def simulated_parachute(
@@ -365,6 +390,8 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
             "mavlink-1",
             "sequence",
             "unsigned-refused",
+            "wrong-key-refused",
+            "replay-refused",
             "signed-answers",
             "soak",
             "arm-nan",
