@@ -103,7 +103,7 @@ def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
     del device.default_intervals[dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC]
     run = Run(device).to()
     lacks = ["request-information", "information-texts", "set-interval", "interval-told"]
-    lacks += ["interval-default", "automatic-release", "release"]
+    lacks += ["interval-default", "interval-stop", "automatic-release", "release"]
     assert run.of(Verdict.NOT_SUPPORTED) == lacks
     assert run.of(Verdict.FAILED) == []
 
@@ -213,6 +213,28 @@ def test_an_abort_leaves_the_device_disarmed() -> None:
     assert run.problem == "aborted by Ctrl-C"
     run.session.abort("again", run.line.now)
     assert run.session.take_events() == []
+
+
+@pytest.mark.parametrize("name", ["set-interval", "interval-stop"])
+def test_a_status_that_was_set_otherwise_comes_as_before_in_the_end(name: str) -> None:
+    """Given a Ctrl-C as it is tried, and a device that takes no default interval."""
+    device = sound()
+    command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    right = device.commands[command]
+    device.commands[command] = lambda params: (
+        right(params) if params[1] else int(dialect.MAV_RESULT_DENIED)
+    )
+    (clause,) = (one for one in CLAUSES if one.name == name)
+    session = Session(MavlinkBench(), [clause], Allowed())
+    run = Run(device, session=session)
+    answer = f"command={command}, result={dialect.MAV_RESULT_ACCEPTED}"
+    run.to(lambda: any(answer in one.text for one in session.bench.traffic))
+    session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    assert run.problem == "aborted by Ctrl-C"
+    told = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS, *[0.0] * 6
+    device.commands[dialect.MAV_CMD_GET_MESSAGE_INTERVAL](told)
+    assert device.after_acknowledgement[-1].interval_us == 1_000_000
 
 
 def test_a_device_that_was_sent_nothing_that_arms_is_not_disarmed() -> None:

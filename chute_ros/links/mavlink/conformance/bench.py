@@ -24,6 +24,9 @@ ANSWER = 1.0
 TRIES = 3
 #: A status comes by its stream at the latest, s.
 STATUS_WITHIN = 3.0
+#: A status is streamed at nominally 1 Hz, us.
+_NOMINAL = 1_000_000
+_STATUS = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
 #: Whose commands these are: an onboard computer.
 US = 191
 _ACTIONS = (dialect.PARACHUTE_DISABLE, dialect.PARACHUTE_ENABLE)
@@ -68,6 +71,8 @@ class MavlinkBench(RecordingBench[Heard]):
         self._encoders: dict[tuple[int, int, bool], FrameEncoder] = {}
         self._output: list[bytes] = []
         self._beat_at = -math.inf
+        #: It was told to send its status otherwise than it does by itself.
+        self._other_interval = False
 
     # -- as the session wants it ------------------------------------------------------------------
 
@@ -215,7 +220,8 @@ class MavlinkBench(RecordingBench[Heard]):
         return {name.replace("_", " "): str(text) for name, text in told.items() if text}
 
     def leave(self) -> Trial:
-        """Each trigger is disarmed, and its status says so."""
+        """Its status comes as before; each trigger is disarmed, and its status says so."""
+        yield from self.status_as_before()
         if self.done is Risk.NONE:
             return "nothing was armed"
         yield from self.command(ARM, 0, EVERY)
@@ -226,6 +232,25 @@ class MavlinkBench(RecordingBench[Heard]):
         if left := int(status.message.arm_status):
             raise failed(f"the device is LEFT ARMED: arm_status is {left} after all was disarmed")
         return "disarmed"
+
+    def status_every(self, interval: int) -> Any:
+        """The answer (Heard) as PARACHUTE_STATUS is to come each so many us (-1: never, 0: as
+        delivered); None: none came."""
+        answer = yield from self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _STATUS, interval)
+        if answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED:
+            self._other_interval = interval != 0
+        return answer
+
+    def status_as_before(self) -> Trial:
+        """PARACHUTE_STATUS comes as it did before it was set otherwise here, or at 1 Hz."""
+        if self._other_interval:
+            answer = yield from self.status_every(0)
+            taken = answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED
+            came = yield from self.wait_for("PARACHUTE_STATUS", STATUS_WITHIN if taken else 0.0)
+            if came is None:
+                yield from self.status_every(_NOMINAL)
+            self._other_interval = False
+        return ""
 
     def disarm_each(self) -> Trial:
         """Each source by a command of its own: not every device takes several at once."""
@@ -264,8 +289,7 @@ class MavlinkBench(RecordingBench[Heard]):
 
     def status(self) -> Any:
         """A PARACHUTE_STATUS of now (Heard), asked for, or as it is streamed."""
-        kind = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
-        self.send(self.command_long(dialect.MAV_CMD_REQUEST_MESSAGE, kind))
+        self.send(self.command_long(dialect.MAV_CMD_REQUEST_MESSAGE, _STATUS))
         status = yield from self.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
         if status is None:
             raise failed(f"no PARACHUTE_STATUS within {STATUS_WITHIN:g} s")

@@ -21,6 +21,8 @@ _STATUS = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
 _RESERVED = ErrorFlags.RESERVED_1 | ErrorFlags.RESERVED_2
 #: Asked for, us, and how many of them are awaited.
 _FASTER, _AWAITED = 200_000, 6
+#: What a device has sent before it was told to stop comes within this, s.
+_UNDER_WAY = 0.5
 #: A clock may be off by this share, or this much, s.
 _CLOCK, _CLOCK_LEAST = 0.05, 0.1
 
@@ -55,8 +57,7 @@ def _pace(bench: MavlinkBench, within: float) -> Trial:
 
 
 def _set(bench: MavlinkBench, interval: int) -> Trial:
-    command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
-    answer = yield from bench.command(command, _STATUS, interval)
+    answer = yield from bench.status_every(interval)
     if answer is None:
         raise failed("MAV_CMD_SET_MESSAGE_INTERVAL is not answered")
     if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
@@ -98,6 +99,18 @@ def _interval_default(bench: MavlinkBench) -> Trial:
     if not 0.6 * before <= gap <= 1.5 * before:
         raise failed(f"0 (default) was accepted: each {gap:.2f} s (before: {before:.2f} s)")
     return f"each {gap:.2f} s again"
+
+
+def _interval_stop(bench: MavlinkBench) -> Trial:
+    yield from _set(bench, -1)
+    yield from bench.watch_on(_UNDER_WAY)
+    since = len(bench.heard)
+    yield from bench.watch_on(STATUS_WITHIN)
+    came = [one.packet for one in bench.heard[since:] if one.kind == "PARACHUTE_STATUS"]
+    yield from bench.status_as_before()
+    if came:
+        raise failed(f"-1 (stop) was accepted, and {len(came)} came in {STATUS_WITHIN:g} s", came)
+    return f"none for {STATUS_WITHIN:g} s"
 
 
 def _interval_unknown(bench: MavlinkBench) -> Trial:
@@ -182,6 +195,12 @@ CLAUSES = (
         "interval 0 brings the default rate back",
         _interval_default,
         "it sends its status faster, and then as before",
+    ),
+    _told(
+        "interval-stop",
+        "interval -1 stops it",
+        _interval_stop,
+        "it does not send its status for some seconds, and then as before",
     ),
     _told(
         "interval-unknown",

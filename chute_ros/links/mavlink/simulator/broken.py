@@ -33,7 +33,7 @@ _NUMBER = slice(10 + 28, 10 + 30)
 #: One that is confused by a frame is deaf, or silent, for so long, s.
 _AFTER_DOUBLED, _AFTER_LOST, _AFTER_NOISE, _AFTER_CUT, _AFTER_V1 = 0.9, 2.9, 3.0, 3.3, 4.1
 #: It falls silent this long after its start, for so long, s.
-_PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
+_PAUSES_AT, _PAUSES_FOR = 35.0, 5.0
 
 
 #: Clause -> the refusal of a frame that is overlooked.
@@ -292,7 +292,7 @@ def _set_without_effect(device: BrokenParachute) -> None:
             dialect.MAVLink_message_interval_message(_STATUS, interval)
         )
 
-    _answers(_SET, _of_status, keep, device)
+    _answers(_SET, lambda of, params: _of_status(of, params) and params[1] > 0, keep, device)
     _answers(_GET, lambda of, params: _STATUS in told, tell, device)
 
 
@@ -363,6 +363,7 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
     "set-interval": _set_without_effect,
     "interval-told": _wrong(_GET, _of_status, _another_interval),
     "interval-default": _wrong(_SET, _default_wanted),
+    "interval-stop": _wrong(_SET, lambda device, params: params[1] == -1),
     "interval-unknown": _wrong(_SET, _unknown_message),
     "boot-time": partial(_says, _STATUS, _seconds),
     "error-flags": _bits("error_status", 1 << 14),
