@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from chute_ros.campaign.scenario import Failure
-from chute_ros.links.registered import links
 from safety_case.documents import Node, files_of, of_kind, parents_of
+from safety_case.parts import ACTIONS, PARTS, without_section
 
 #: How a part may fail, and how a control action may be unsafe.
 MODES = ("late", "lost", "wrong", "twice", "restarted", "forged")
@@ -28,9 +28,9 @@ def problems(nodes: Sequence[Node], root: Path) -> list[str]:
     return [
         *(one for requirement in requirements for one in _of_requirement(requirement, root)),
         *_tests_of_nobody(requirements, root),
-        *_incomplete(failures, MODES, "failure"),
-        *_incomplete(actions, KINDS, "unsafe action"),
-        *_links_without_failures(failures),
+        *_incomplete(failures, PARTS, MODES, "failure"),
+        *_incomplete(actions, ACTIONS, KINDS, "unsafe action"),
+        *without_section(),
         *(one for row in failures for one in _of_failure(row)),
         *(one for row in rows for one in _without_parents(row)),
         *(one for row in [*rows, *of_kind(nodes, "CRITERION")] for one in _not_there(row, root)),
@@ -62,24 +62,21 @@ def _tests_of_nobody(requirements: Iterable[Node], root: Path) -> Iterable[str]:
             )
 
 
-def _incomplete(rows: Iterable[Node], words: Collection[str], what: str) -> Iterable[str]:
-    """In each section a row of each word."""
-    titles: dict[str, list[str]] = {}
+def _incomplete(
+    rows: Iterable[Node], sections: Collection[str], words: Collection[str], what: str
+) -> Iterable[str]:
+    """In each of these sections a row of each word, and no other section."""
+    titles: dict[str, list[str]] = {section: [] for section in sections}
     for row in rows:
         titles.setdefault(row["SECTION"], []).append(row["TITLE"])
     for section, has in titles.items():
+        if section not in sections:
+            yield f"{section}: no such section in safety_case/parts.py"
         for word in words:
             if has.count(word) != 1:
                 yield f"{section}: {has.count(word)} rows for the {what} '{word}', need 1"
         for word in sorted({*has} - {*words}):
             yield f"{section}: the {what} '{word}' is none of {', '.join(words)}"
-
-
-def _links_without_failures(failures: Iterable[Node]) -> Iterable[str]:
-    parts = {row["SECTION"] for row in failures}
-    for name in links():
-        if not any(part.startswith(f"{name}: ") for part in parts):
-            yield f"the link {name} has no section in safety_case/fmea.sdoc"
 
 
 def _of_failure(row: Node) -> Iterable[str]:

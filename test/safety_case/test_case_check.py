@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from chute_ros.links.registered import links
 from safety_case import single_failures, thresholds
 from safety_case.check import KINDS, MODES, problems
+from safety_case.parts import ACTIONS, PARTS, without_section
 
 SHOWN = "- ``test/test_deploy.py::test_it_opens``"
 
@@ -27,16 +27,15 @@ def row(kind, section, title, **other):
 
 
 def failures():
-    parts = [f"{name}: the device" for name in links()]
     return [
         row("FAILURE_MODE", part, mode, SINGLE="NONE", STATEMENT="")
-        for part in parts
+        for part in PARTS
         for mode in MODES
     ]
 
 
 def actions():
-    return [row("UNSAFE_ACTION", "Deploy", kind) for kind in KINDS]
+    return [row("UNSAFE_ACTION", action, kind) for action in ACTIONS for kind in KINDS]
 
 
 @pytest.fixture
@@ -114,7 +113,7 @@ def test_a_part_without_one_of_its_failures_is_told(root):
     first = failures()[0]["SECTION"]
     assert told == [
         f"{first}: 0 rows for the failure 'late', need 1",
-        "Deploy: 0 rows for the unsafe action 'stopped too soon', need 1",
+        f"{actions()[-1]['SECTION']}: 0 rows for the unsafe action 'stopped too soon', need 1",
     ]
 
 
@@ -126,11 +125,33 @@ def test_a_failure_that_is_none_of_the_six_is_told(root):
     )
 
 
-def test_a_link_without_failures_is_told(root):
-    name = next(iter(links()))
-    rows = [one for one in failures() if not one["SECTION"].startswith(name)]
-    told = problems([requirement(), *rows, *actions()], root)
-    assert told == [f"the link {name} has no section in safety_case/fmea.sdoc"]
+@pytest.mark.parametrize("section", ["a hot standby", "Disarm the parachute"])
+def test_a_part_or_an_action_that_is_left_out_whole_is_told(root, section):
+    rows = [one for one in [*failures(), *actions()] if one["SECTION"] != section]
+    told = problems([requirement(), *rows], root)
+    assert len(told) in (len(MODES), len(KINDS))
+    assert all(one.startswith(f"{section}: 0 rows for the ") for one in told)
+
+
+def test_a_section_that_stands_for_nothing_is_told(root):
+    odd = [row("UNSAFE_ACTION", "Wave", kind) for kind in KINDS]
+    told = problems([requirement(), *failures(), *actions(), *odd], root)
+    assert told == ["Wave: no such section in safety_case/parts.py"]
+
+
+@pytest.mark.parametrize(
+    ("table", "section", "told"),
+    [
+        (PARTS, "relay: an output without telemetry", ["the link relay", "board"]),
+        (PARTS, "a hot standby", ["standby"]),
+        (PARTS, "other sources of the vehicle", ["imu", "mavros", "odometry"]),
+        (ACTIONS, "Release of the flight block", ["FLIGHT_BLOCK_RELEASE"]),
+        (ACTIONS, "Reset", ["safety/reset"]),
+    ],
+)
+def test_what_the_code_has_needs_a_section(monkeypatch, table, section, told):
+    monkeypatch.delitem(table, section)
+    assert [one.split(" has no ")[0] for one in without_section()] == told
 
 
 @pytest.mark.parametrize(("single", "stays"), [("MISSED", ""), ("NONE", "it is rare")])
@@ -145,7 +166,7 @@ def test_a_row_that_no_requirement_answers_is_told(root):
     rows = [*failures(), *actions()]
     rows[-1] = {**rows[-1], "RELATIONS": []}
     (told,) = problems([requirement(), *rows], root)
-    assert told.startswith("Deploy stopped too soon: no requirement answers it")
+    assert told.startswith(f"{rows[-1]['UID']}: no requirement answers it")
 
 
 def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
