@@ -17,6 +17,10 @@ from safety_case.parts import ACTIONS, PARTS, without_section
 MODES = ("late", "lost", "wrong", "twice", "restarted", "forged")
 KINDS = ("not given", "given wrongly", "too early", "too late", "stopped too soon")
 
+#: Folders of the tests; and of the modules each of which, or whose folder, a requirement names.
+TESTS = ("test/", "msg_defs/test/")
+MODULES = ("chute_ros/supervisor", "chute_ros/runtime", "chute_ros/links")
+
 _NAMED = re.compile(r"``([\w./-]+)(?:::(\w+))?``")
 
 
@@ -28,6 +32,8 @@ def problems(nodes: Sequence[Node], root: Path) -> list[str]:
     return [
         *(one for requirement in requirements for one in _of_requirement(requirement, root)),
         *_tests_of_nobody(requirements, root),
+        *_modules_of_nobody(requirements, root),
+        *_pages_of_nobody(requirements, root),
         *_incomplete(failures, PARTS, MODES, "failure"),
         *_incomplete(actions, ACTIONS, KINDS, "unsafe action"),
         *without_section(),
@@ -40,9 +46,9 @@ def problems(nodes: Sequence[Node], root: Path) -> list[str]:
 
 def _of_requirement(node: Node, root: Path) -> Iterable[str]:
     files = files_of(node)
-    if not any(one.startswith("test/") for one in files):
+    if not any(one.startswith(TESTS) for one in files):
         yield f"{node['UID']} is an orphan: no test shows it; name one in its RELATIONS"
-    if all(one.startswith("test/") for one in files):
+    if all(one.startswith(TESTS) for one in files):
         yield f"{node['UID']} is an orphan: no code fulfils it; name a file in its RELATIONS"
     for name in files:
         if not (root / name).is_file():
@@ -50,16 +56,52 @@ def _of_requirement(node: Node, root: Path) -> Iterable[str]:
     for page in _words(node, "PAGES"):
         if not (root / "docs" / page).is_file():
             yield f"{node['UID']}: there is no page docs/{page}"
+    for folder in _words(node, "FOLDERS"):
+        if not (root / folder).is_dir():
+            yield f"{node['UID']}: there is no folder {folder}"
 
 
 def _tests_of_nobody(requirements: Iterable[Node], root: Path) -> Iterable[str]:
-    named = {one for requirement in requirements for one in files_of(requirement)}
-    for path in sorted((root / "test").rglob("test_*.py")):
+    named = _files(requirements)
+    for path in sorted(one for folder in TESTS for one in (root / folder).rglob("test_*.py")):
         if (name := path.relative_to(root).as_posix()) not in named:
             yield (
                 f"{name} is an orphan: it shows no requirement; name it in the RELATIONS of one "
                 "in safety_case/requirements.sdoc"
             )
+
+
+def _modules_of_nobody(requirements: Iterable[Node], root: Path) -> Iterable[str]:
+    named = _files(requirements)
+    folders = {one for requirement in requirements for one in _words(requirement, "FOLDERS")}
+    for path in sorted(one for folder in MODULES for one in (root / folder).rglob("*.py")):
+        name, folder = (one.relative_to(root).as_posix() for one in (path, path.parent))
+        if name not in named and folder not in folders and _has_code(path):
+            yield (
+                f"{name} is an orphan: no requirement names it; name it in the RELATIONS, or its "
+                "folder in FOLDERS, of one in safety_case/requirements.sdoc"
+            )
+
+
+def _has_code(path: Path) -> bool:
+    """More than the docstring of a package."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return path.name != "__init__.py" or len(tree.body) > 1
+
+
+def _pages_of_nobody(requirements: Iterable[Node], root: Path) -> Iterable[str]:
+    named = {one for requirement in requirements for one in _words(requirement, "PAGES")}
+    for path in sorted((root / "docs").rglob("*.md")):
+        # The index promises nothing itself.
+        if (name := path.relative_to(root / "docs").as_posix()) not in {*named, "index.md"}:
+            yield (
+                f"docs/{name} is an orphan: it describes no requirement; name it in the PAGES of "
+                "one in safety_case/requirements.sdoc"
+            )
+
+
+def _files(requirements: Iterable[Node]) -> set[str]:
+    return {one for requirement in requirements for one in files_of(requirement)}
 
 
 def _incomplete(

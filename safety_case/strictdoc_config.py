@@ -3,7 +3,17 @@
 from strictdoc.core.project_config import ProjectConfig
 
 #: Folders of the files that requirements name.
-FOLDERS = ("bench", "chute_ros", "config", "faults", "safety_case", "scripts", "sitl", "test")
+FOLDERS = (
+    "bench",
+    "chute_ros",
+    "config",
+    "faults",
+    "msg_defs",
+    "safety_case",
+    "scripts",
+    "sitl",
+    "test",
+)
 
 
 def create_config() -> ProjectConfig:

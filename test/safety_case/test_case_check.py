@@ -76,6 +76,35 @@ def test_a_test_that_shows_no_requirement_is_an_orphan(root):
     assert told.startswith("test/tools/test_orphan.py is an orphan: it shows no requirement")
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("msg_defs/test/test_new.py", "it shows no requirement"),
+        ("chute_ros/supervisor/conditions/new.py", "no requirement names it"),
+        ("chute_ros/runtime/new.py", "no requirement names it"),
+        ("chute_ros/links/new/__init__.py", "no requirement names it"),
+        ("docs/guide/new.md", "it describes no requirement"),
+    ],
+)
+def test_what_no_requirement_names_is_an_orphan(root, name, told):
+    path = root / name
+    path.parent.mkdir(parents=True)
+    path.write_text('"""A docstring."""\n\nLINK = None\n')
+    (found,) = problems([requirement(), *failures(), *actions()], root)
+    assert found.startswith(f"{name} is an orphan: {told}")
+
+
+def test_a_folder_names_the_modules_in_it_and_none_below(root):
+    for name in ("links/new/node.py", "links/new/protocol/wire.py", "links/new/__init__.py"):
+        path = root / "chute_ros" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text('"""A docstring."""\n')
+    named = requirement(FOLDERS="chute_ros/links/new, chute_ros/links/gone")
+    gone, below = problems([named, *failures(), *actions()], root)
+    assert gone == "R-1: there is no folder chute_ros/links/gone"
+    assert below.startswith("chute_ros/links/new/protocol/wire.py is an orphan")
+
+
 def test_a_file_that_is_not_there_is_told(root):
     relations = [*requirement()["RELATIONS"], {"TYPE": "File", "VALUE": "chute_ros/gone.py"}]
     told = problems([requirement(RELATIONS=relations), *failures(), *actions()], root)
@@ -85,7 +114,7 @@ def test_a_file_that_is_not_there_is_told(root):
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"PAGES": "none.md"}, "R-1: there is no page docs/none.md"),
+        ({"PAGES": "deploy.md, none.md"}, "R-1: there is no page docs/none.md"),
         ({"CAMPAIGN": "MOTOR, WINGS"}, "R-1: the campaign has no failure WINGS"),
     ],
 )
