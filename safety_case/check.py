@@ -8,8 +8,10 @@ import functools
 import re
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
+from typing import get_args
 
-from chute_ros.campaign.scenario import Failure
+from chute_ros.campaign.judge import Count
+from chute_ros.campaign.scenario import Failure, Fault
 from safety_case.documents import Node, files_of, of_kind, parents_of
 from safety_case.parts import ACTIONS, PARTS, without_section
 
@@ -20,6 +22,9 @@ KINDS = ("not given", "given wrongly", "too early", "too late", "stopped too soo
 #: Folders of the tests; and of the modules each of which, or whose folder, a requirement names.
 TESTS = ("test/", "msg_defs/test/")
 MODULES = ("chute_ros/supervisor", "chute_ros/runtime", "chute_ros/links")
+
+#: Rows of the campaign's page: what fails, what else goes wrong, what a flight is counted as.
+ROWS = {*Failure.__members__, *(one.__name__ for one in get_args(Fault)), *Count.__members__}
 
 _NAMED = re.compile(r"``([\w./-]+)(?:::(\w+))?``")
 
@@ -41,6 +46,7 @@ def problems(nodes: Sequence[Node], root: Path) -> list[str]:
         *(one for row in rows for one in _without_parents(row)),
         *(one for row in [*rows, *of_kind(nodes, "CRITERION")] for one in _not_there(row, root)),
         *(one for row in [*requirements, *failures] for one in _campaign(row)),
+        *(one for requirement in requirements for one in _without_row(requirement)),
     ]
 
 
@@ -151,9 +157,15 @@ def _functions(path: Path) -> frozenset[str]:
 
 
 def _campaign(row: Node) -> Iterable[str]:
-    for name in _words(row, "CAMPAIGN"):
-        if name not in Failure.__members__:
-            yield f"{row['UID']}: the campaign has no failure {name}"
+    if not row.get("CAMPAIGN", "").startswith("none:"):
+        for name in _words(row, "CAMPAIGN"):
+            if name not in ROWS:
+                yield f"{row['UID']}: the campaign has no row {name}"
+
+
+def _without_row(requirement: Node) -> Iterable[str]:
+    if not requirement.get("CAMPAIGN", "").removeprefix("none:").strip():
+        yield f"{requirement['UID']}: CAMPAIGN names rows of the campaign, or says 'none: why'"
 
 
 def _words(node: Node, field: str) -> list[str]:

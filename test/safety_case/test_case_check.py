@@ -17,7 +17,7 @@ def requirement(uid="R-1", **other):
     files = ["chute_ros/deploy.py", "test/test_deploy.py"]
     relations = [{"TYPE": "File", "VALUE": one} for one in files]
     node = {"_NODE_TYPE": "REQUIREMENT", "UID": uid, "SECTION": "deploy", "PAGES": "deploy.md"}
-    return {**node, "RELATIONS": relations, **other}
+    return {**node, "CAMPAIGN": "MOTOR", "RELATIONS": relations, **other}
 
 
 def row(kind, section, title, **other):
@@ -115,11 +115,18 @@ def test_a_file_that_is_not_there_is_told(root):
     ("changed", "told"),
     [
         ({"PAGES": "deploy.md, none.md"}, "R-1: there is no page docs/none.md"),
-        ({"CAMPAIGN": "MOTOR, WINGS"}, "R-1: the campaign has no failure WINGS"),
+        ({"CAMPAIGN": "MOTOR, Stop, DOUBLED, WINGS"}, "R-1: the campaign has no row WINGS"),
     ],
 )
-def test_a_page_or_a_failure_of_the_campaign_that_is_not_there_is_told(root, changed, told):
+def test_a_page_or_a_row_of_the_campaign_that_is_not_there_is_told(root, changed, told):
     assert problems([requirement(**changed), *failures(), *actions()], root) == [told]
+
+
+@pytest.mark.parametrize(("said", "enough"), [("", 0), ("none: ", 0), ("none: it is text", 1)])
+def test_a_requirement_names_a_row_of_the_campaign_or_says_why_not(root, said, enough):
+    told = problems([requirement(CAMPAIGN=said), *failures(), *actions()], root)
+    assert len(told) == 1 - enough
+    assert all("says 'none: why'" in one for one in told)
 
 
 @pytest.mark.parametrize(
