@@ -25,7 +25,7 @@ def main() -> None:
     try:
         remove_made()
         nodes = read()
-        if found := check.problems(nodes, ROOT):
+        if found := [*check.problems(nodes, ROOT), *thresholds.problems()]:
             sys.exit("\n".join(f"safety case: {one}" for one in found))
         told = f"{len(nodes)} requirements, rows and texts are traced"
         if chosen.check:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -39,21 +40,35 @@ def write() -> None:
     write_made("thresholds", "Thresholds", parts)
 
 
+def problems(folder: Path = _PROFILES) -> Iterable[str]:
+    """Each value and rule without its why, in a line."""
+    for path in sorted(folder.glob("*.yaml")):
+        text = path.read_text(encoding="utf-8")
+        profile, comments = yaml.safe_load(text), dict(_comments(text))
+        for name in [*_values(profile), *profile.get("measurements", ())]:
+            if not comments.get(name):
+                said = "say in a comment above it where it is from, or 'ours' and the reason"
+                yield f"{path.name}: {name} has no why; {said}"
+        for name, rule in profile["rules"].items():
+            if not rule.get("source"):
+                yield f"{path.name}: the rule '{name}' has no source"
+
+
+def _values(profile: Mapping[str, Any]) -> list[str]:
+    return [key for key in profile if key not in ("profile", "rules", "measurements")]
+
+
 def _profile(profile: Mapping[str, Any], text: str) -> str:
     comments = dict(_comments(text))
-    values = [
-        (f"``{key}``", str(value), plain(comments.get(key, "")))
-        for key, value in profile.items()
-        if key not in ("profile", "rules", "measurements")
-    ]
+    values = [(f"``{key}``", str(profile[key]), plain(comments[key])) for key in _values(profile)]
     for name, limits in profile.get("measurements", {}).items():
         told = ", ".join(f"{key} {value}" for key, value in limits.items())
-        values.append((f"``measurements: {name}``", plain(told), plain(comments.get(name, ""))))
+        values.append((f"``measurements: {name}``", plain(told), plain(comments[name])))
     rules = [
         (
             f"**{plain(name)}**\n\n{plain(rule.get('says', ''))}",
             _limits(rule),
-            plain(rule.get("source", "")),
+            plain(rule["source"]),
         )
         for name, rule in profile["rules"].items()
     ]

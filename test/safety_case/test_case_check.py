@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from safety_case import single_failures, thresholds
 from safety_case.check import KINDS, MODES, problems
+from safety_case.documents import ROOT
 from safety_case.parts import ACTIONS, PARTS, without_section
 
 SHOWN = "- ``test/test_deploy.py::test_it_opens``"
@@ -216,6 +218,26 @@ def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
     assert "missed deploy" in text
     assert "false deploy" in text
     assert text.count("[LINK: ") == 1
+
+
+@pytest.mark.parametrize("profile", ["by_hand", "fixed_wing", "multirotor", "rocket"])
+def test_a_threshold_without_its_why_is_told(tmp_path, profile):
+    text = (ROOT / "config" / "profiles" / f"{profile}.yaml").read_text()
+    path = tmp_path / "cut.yaml"
+    path.write_text(text)
+    assert list(thresholds.problems(tmp_path)) == []
+    lines = [line for line in text.splitlines() if not line.lstrip().startswith("#")]
+    path.write_text("\n".join(lines))
+    read = yaml.safe_load(text)
+    values = {*read, *read.get("measurements", ())} - {"profile", "rules", "measurements"}
+    told = list(thresholds.problems(tmp_path))
+    assert {one.split(" has no why")[0] for one in told} == {f"cut.yaml: {one}" for one in values}
+
+
+def test_a_rule_without_its_source_is_told(tmp_path):
+    rules = "rules:\n  fall:\n    says: it falls\n"
+    (tmp_path / "new.yaml").write_text(f"profile: new\n# m. ours.\nlow_height: 3.0\n{rules}")
+    assert list(thresholds.problems(tmp_path)) == ["new.yaml: the rule 'fall' has no source"]
 
 
 def test_the_page_of_thresholds_has_each_rule_of_each_profile(tmp_path, monkeypatch):
