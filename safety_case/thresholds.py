@@ -20,9 +20,9 @@ in the profile; "ours" means that no public source gives it. How a rule counts:
 ``docs/reference/rules.md``.
 """
 _MOVED = """
-What changes when limits move, by ``make compare`` (docs/evidence/compare.md): each guard with its
-limits scaled by these factors. Of this product the time of every rule (``for``) is scaled, of a
-peer its own limits. A cell has the flights missed or late, in percent of those that only a
+What changes when limits move, by ``make compare`` (docs/evidence/compare.md): each guard scaled
+by these factors. Of this product the time of every rule (``for``) is scaled and no other limit,
+of a peer its limits. A cell has the flights missed or late, in percent of those that only a
 parachute could save, and the flights ended although they went well, in percent of all. The
 campaign draws faults around each failure, far more often than flights have them: these shares
 compare guards, and are no rates of a fleet.

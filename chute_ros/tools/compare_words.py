@@ -63,6 +63,7 @@ Of the flights that only a parachute could save. The last two columns: medians o
 which both the peer and this product released."""
 _SCALES = ", ".join(f"{one:g}" for one in FACTORS)
 CURVES = f"""\
-One of {CURVE_OF} flights was flown again with the limits of each guard scaled by {_SCALES} (the
-first table says which). Missed or late in percent of the flights that only a parachute could save;
+One of {CURVE_OF} flights was flown again with each guard scaled by {_SCALES}: the time of every
+rule (`for`) of this product and no other limit of it, the limits of a peer (the table of settings
+says which). Missed or late in percent of the flights that only a parachute could save;
 false in percent of all. The large dot: not scaled."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from chute_ros.tools.compare_words import CURVES
 from safety_case import single_failures, thresholds
 from safety_case.check import KINDS, MODES, problems
 from safety_case.documents import ROOT
@@ -218,6 +219,10 @@ def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
     assert "missed deploy" in text
     assert "false deploy" in text
     assert text.count("[LINK: ") == 1
+
+
+def test_the_page_that_compares_says_what_was_scaled_as_its_code_does():
+    assert CURVES in (ROOT / "docs" / "evidence" / "compare.md").read_text()
 
 
 @pytest.mark.parametrize("profile", ["by_hand", "fixed_wing", "multirotor", "rocket"])
