@@ -59,6 +59,9 @@ def _make(nodes: list[Node]) -> None:
         )
         Path(_OUT / "work" / "html").rename(_OUT / "html")
         Path(_OUT / "work" / "html2pdf" / "pdf").rename(_OUT / "pdf")
+        for path in (_OUT / "pdf").iterdir():
+            # StrictDoc leaves long ones for their owner alone.
+            path.chmod(0o644)
     finally:
         remove_made()
         shutil.rmtree(_OUT / "work", ignore_errors=True)

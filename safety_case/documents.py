@@ -24,6 +24,8 @@ Node = Mapping[str, Any]
 _HEAD = """[DOCUMENT]
 TITLE: {title}
 UID: {uid}
+VERSION: @GIT_VERSION
+DATE: @GIT_COMMIT_DATETIME
 OPTIONS:
   MARKUP: {markup}
   NODE_IN_TOC: False

@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
 
 from chute_ros.campaign.scenario import part
-from chute_ros.links.api import SUPERVISOR
+from chute_ros.links.api import SUPERVISOR, VehicleKind
 from chute_ros.links.registered import links, vehicles
 from chute_ros.model import Action
 from chute_ros.protocol.vehicle_merge import AUTOPILOTS, IMU, ODOMETRY
@@ -64,15 +64,28 @@ def without_section() -> Iterable[str]:
         yield f"{name} has no control action in safety_case/parts.py"
 
 
+def carried_by(section: str) -> list[str]:
+    """The vehicles of config/ that have this part; all, if it is not one of a link."""
+    link = section.partition(": ")[0]
+    all_vehicles = vehicles().values()
+    if link not in links():
+        return [vehicle.name for vehicle in all_vehicles]
+    devices = {*PARTS[section]} & _devices()
+    return [
+        vehicle.name
+        for vehicle in all_vehicles
+        if link in vehicle.links and (not devices or devices & _devices_of(vehicle))
+    ]
+
+
 def _devices() -> set[str]:
+    return {device for vehicle in vehicles().values() for device in _devices_of(vehicle)}
+
+
+def _devices_of(vehicle: VehicleKind) -> set[str]:
     """Those that the campaign takes the power from."""
-    return {
-        device
-        for vehicle in vehicles().values()
-        for link in vehicle.links
-        if links()[link].part
-        for device in part(link).stopping(vehicle)
-    }
+    parts = (part(link) for link in vehicle.links if links()[link].part)
+    return {device for one in parts for device in one.stopping(vehicle)}
 
 
 @functools.cache

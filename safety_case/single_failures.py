@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from safety_case.documents import Node, list_table, of_kind, write_made
+from chute_ros.links.registered import vehicles
+from safety_case.documents import Node, list_table, of_kind, plain, write_made
+from safety_case.parts import carried_by
 
 _INTRODUCTION = """
 Each single failure that, with the shipped settings, can lead to a missed or to a false deploy
 although everything else works. All other rows of the `FMEA <fmea.html>`_ are covered by what the
 row says. The last column says why the failure stays, and what the integrator must do.
+
+WIRING: the vehicles of ``config/`` that have this part.
 """
 _LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
 
@@ -24,16 +28,30 @@ def write(nodes: Sequence[Node]) -> None:
     rows = [
         (
             f"{one['SECTION']}: **{one['TITLE']}**\n\n[LINK: {one['UID']}, {one['UID']}]",
+            _wiring(one["SECTION"]),
             "\n\n".join(_LEADS[word.strip()] for word in one["SINGLE"].split(",")),
             _line(one["STATEMENT"]),
             _line(one["STAYS"]),
         )
         for one in stay
     ]
-    head = ("what fails", "leads to", "what happens", "why it stays, and what you must do")
+    head = (
+        "what fails",
+        "wiring",
+        "leads to",
+        "what happens",
+        "why it stays, and what you must do",
+    )
+    table = list_table(head, rows, (18, 12, 12, 22, 36))
+    kinds = "\n".join(f"- {one.name}: {plain(one.description)}" for one in vehicles().values())
     counted = f"{len(stay)} of {len(failures)} failure modes stay."
-    parts = [("", f"{_INTRODUCTION}\n{counted}\n\n{list_table(head, rows, (20, 14, 26, 40))}")]
-    write_made("single_failures", "Single failures", parts)
+    text = f"{_INTRODUCTION}\n{kinds}\n\n{counted}\n\n{table}"
+    write_made("single_failures", "Single failures", [("", text)])
+
+
+def _wiring(section: str) -> str:
+    names = carried_by(section)
+    return "all" if len(names) == len(vehicles()) else ", ".join(names)
 
 
 def _line(text: str) -> str:

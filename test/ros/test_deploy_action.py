@@ -1,6 +1,7 @@
 """The action safety/deploy_action: the service safety/deploy, with what happens as feedback."""
 
 import time
+from contextlib import ExitStack
 
 import pytest
 from action_msgs.msg import GoalStatus
@@ -41,7 +42,9 @@ class Caller:
         self.client = ActionClient(self.client_node, Deploy, "safety/deploy_action")
         self.feedback = []
         self.until(self.client.server_is_ready, "the action is there")
-        bench.at_end.callback(self.close)
+        self.at_end = ExitStack()
+        self.at_end.callback(self.close)
+        bench.at_end.push(self.at_end)
 
     def await_service(self):
         self.until(self.node._client.service_is_ready, "the service is there")
@@ -134,6 +137,19 @@ def test_a_cancel_is_refused_and_the_release_goes_on(scene, caller):
     scene.link.report_newest(Action.DEPLOY, Outcome.CONFIRMED)
     status, result = caller.result(goal)
     assert (status, result.success) == (GoalStatus.STATUS_SUCCEEDED, True)
+
+
+def test_a_caller_that_ends_in_the_middle_takes_nothing_back(scene, caller):
+    """Given the client and the action's node end once the order is accepted, then the supervisor
+    carries it out, once."""
+    scene.link.outcomes = [Outcome.SENT]
+    caller.send(force=True, reason="a test")
+    caller.until(lambda: caller.feedback, "it is under way")
+    caller.at_end.close()
+    scene.await_decision(Action.DEPLOY)
+    scene.link.report_newest(Action.DEPLOY, Outcome.CONFIRMED)
+    scene.await_stage(SafetyState.DEPLOYED)
+    assert len(scene.decided(Action.DEPLOY)) == 1
 
 
 def test_two_callers_at_once_both_get_the_answer(scene, caller):

@@ -10,8 +10,8 @@ import yaml
 from chute_ros.tools.compare_words import CURVES
 from safety_case import single_failures, thresholds
 from safety_case.check import KINDS, MODES, problems
-from safety_case.documents import ROOT
-from safety_case.parts import ACTIONS, PARTS, without_section
+from safety_case.documents import FOLDER, ROOT
+from safety_case.parts import ACTIONS, PARTS, carried_by, without_section
 
 SHOWN = "- ``test/test_deploy.py::test_it_opens``"
 
@@ -219,6 +219,29 @@ def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
     assert "missed deploy" in text
     assert "false deploy" in text
     assert text.count("[LINK: ") == 1
+
+
+@pytest.mark.parametrize(
+    ("section", "names"),
+    [
+        ("mavlink_parachute: the parachute and its wire", {"mavlink", "both"}),
+        ("mavlink_parachute: the autopilot", {"mavlink", "relay", "upf", "both"}),
+        ("upf_can: the trigger", {"upf", "both"}),
+        ("umbilical: the flight computer and the cable", {"umbilical"}),
+        ("relay: an output without telemetry", {"relay"}),
+        ("the supervisor", {"mavlink", "relay", "umbilical", "upf", "both"}),
+    ],
+)
+def test_each_part_is_of_the_wirings_that_have_it(section, names):
+    assert {*carried_by(section)} == names
+
+
+def test_each_document_has_its_version(tmp_path, monkeypatch):
+    written = [*FOLDER.glob("*.sdoc")]
+    monkeypatch.setattr("safety_case.documents.FOLDER", tmp_path)
+    thresholds.write()
+    for path in [*written, *tmp_path.glob("*.sdoc")]:
+        assert "\nVERSION: @GIT_VERSION\n" in path.read_text(), path.name
 
 
 def test_the_page_that_compares_says_what_was_scaled_as_its_code_does():
