@@ -11,7 +11,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from safety_case import check, minimum_height, single_failures, supply, thresholds
+from safety_case import check, evidence, minimum_height, single_failures, supply, thresholds
 from safety_case.documents import ROOT, Node, NotReadError, read, remove_made, strictdoc
 
 _OUT = ROOT / "case"
@@ -24,6 +24,7 @@ def main() -> None:
     chosen = options.parse_args()
     try:
         remove_made()
+        evidence.keep_place()
         nodes = read()
         if found := [*check.problems(nodes, ROOT), *thresholds.problems()]:
             sys.exit("\n".join(f"safety case: {one}" for one in found))
@@ -31,10 +32,13 @@ def main() -> None:
         if chosen.check:
             print(f"safety case: {told}")
             return
+        evidence.write()
         _make(nodes)
         print(f"{told}: {_OUT}/html/index.html, {_OUT}/pdf")
     except NotReadError as error:
         sys.exit(f"safety case: {error}")
+    finally:
+        remove_made()
 
 
 def _tell(what: str) -> None:
@@ -63,7 +67,6 @@ def _make(nodes: list[Node]) -> None:
             # StrictDoc leaves long ones for their owner alone.
             path.chmod(0o644)
     finally:
-        remove_made()
         shutil.rmtree(_OUT / "work", ignore_errors=True)
 
 

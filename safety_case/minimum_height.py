@@ -6,6 +6,7 @@ import re
 import shutil
 
 from safety_case.documents import PICTURES, ROOT, write_made
+from safety_case.evidence import age
 
 _PAGE = ROOT / "docs" / "evidence" / "minimum_height.md"
 _PICTURE = re.compile(r"\]\(([\w.]+\.svg)\)")
@@ -22,7 +23,10 @@ def write() -> None:
     text = _LINK.sub(r"\1", _PICTURE.sub(r"](_assets/\1)", text))
     before, *sections = text.split("\n## ")
     title, _, introduction = before.removeprefix("# ").partition("\n")
-    parts = [("", introduction), *(_titled(section) for section in sections)]
+    parts = [
+        ("", f"{introduction}\n\n{age(_PAGE.name)}"),
+        *(_titled(section) for section in sections),
+    ]
     write_made("minimum_height", title, parts, markup="Markdown")
 
 

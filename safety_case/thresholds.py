@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from safety_case.documents import ROOT, list_table, plain, write_made
+from safety_case.evidence import age
 
 _PROFILES = ROOT / "config" / "profiles"
 _COMPARE = ROOT / "docs" / "evidence" / "compare.md"
@@ -115,4 +116,4 @@ def _moved() -> str:
     lines = [line for line in section.splitlines() if line.startswith("| ")]
     head, *body = ([cell.strip() for cell in line.strip("| ").split("|")] for line in lines)
     widths = [28, *([72 // (len(head) - 1)] * (len(head) - 1))]
-    return f"{_MOVED}\n{list_table(head, body, widths)}"
+    return f"{_MOVED}\n{age(_COMPARE.name)}\n\n{list_table(head, body, widths)}"

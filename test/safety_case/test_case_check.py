@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
 import yaml
 
 from chute_ros.tools.compare_words import CURVES
-from safety_case import single_failures, thresholds
+from safety_case import evidence, single_failures, thresholds
 from safety_case.check import KINDS, MODES, problems
 from safety_case.documents import FOLDER, ROOT
 from safety_case.parts import ACTIONS, PARTS, carried_by, without_section
@@ -234,6 +235,65 @@ def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
 )
 def test_each_part_is_of_the_wirings_that_have_it(section, names):
     assert {*carried_by(section)} == names
+
+
+def git(folder, *arguments):
+    person = ("-c", "user.name=a", "-c", "user.email=a@b.invalid")
+    subprocess.run(["git", *person, *arguments], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.fixture
+def history(tmp_path, monkeypatch):
+    """A repository with a page that a run wrote; the page's words were changed later."""
+    monkeypatch.setattr("safety_case.evidence.ROOT", tmp_path)
+    git(tmp_path, "init", "-q")
+    page = tmp_path / "docs" / "evidence" / "fall.md"
+    page.parent.mkdir(parents=True)
+    for number, words in enumerate(("Falls.", "Falls, in words.")):
+        page.write_text(f"Written by `make fall`: 12 s, here.\n\n{words}\n")
+        git(tmp_path, "add", ".")
+        git(tmp_path, "commit", "-qm", str(number))
+    return tmp_path
+
+
+def test_a_page_is_as_old_as_its_numbers(history):
+    first = subprocess.check_output(["git", "rev-parse", "HEAD~1"], cwd=history, text=True)
+    told = evidence.age("fall.md")
+    assert f"commit {first[:7]}" in told
+    assert told.endswith("; unchanged since: profiles, supervisor, campaign.")
+
+
+def test_what_changed_since_a_page_was_written_is_counted(history):
+    for number in range(2):
+        path = history / "config" / "profiles" / f"{number}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+        git(history, "add", ".")
+        git(history, "commit", "-qm", "a profile")
+    assert evidence.age("fall.md").endswith("; commits since: profiles 2.")
+
+
+@pytest.mark.parametrize("way", ["no repository", "shallow", "not committed"])
+def test_a_page_whose_age_nobody_knows_says_so(history, tmp_path_factory, monkeypatch, way):
+    folder, name = tmp_path_factory.mktemp("elsewhere"), "fall.md"
+    if way == "shallow":
+        git(folder, "clone", "-q", "--depth", "1", history.as_uri(), ".")
+    elif way == "not committed":
+        folder, name = history, "new.md"
+    monkeypatch.setattr("safety_case.evidence.ROOT", folder)
+    assert "when it was written is not known" in evidence.age(name)
+
+
+def test_the_introduction_says_of_each_page_how_old_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr("safety_case.documents.FOLDER", tmp_path)
+    evidence.write()
+    text = (tmp_path / "made_evidence.sdoc").read_text()
+    for path in (ROOT / "docs" / "evidence").glob("*.md"):
+        assert f"- ``docs/evidence/{path.name}``: " in text
+    assert (
+        "\n[DOCUMENT_FROM_FILE]\nFILE: made_evidence.sdoc\n"
+        in (FOLDER / "introduction.sdoc").read_text()
+    )
 
 
 def test_each_document_has_its_version(tmp_path, monkeypatch):
