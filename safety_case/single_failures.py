@@ -13,7 +13,7 @@ Each single failure that, with the shipped settings, can lead to a missed or to 
 although everything else works. All other rows of the `FMEA <fmea.html>`_ are covered by what the
 row says. The last column says why the failure stays, and what the integrator must do.
 
-WIRING: the vehicles of ``config/`` that have this part.
+IN: the vehicles of ``config/`` that have this part.
 """
 _LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
 
@@ -28,21 +28,18 @@ def write(nodes: Sequence[Node]) -> None:
     rows = [
         (
             f"{one['SECTION']}: **{one['TITLE']}**\n\n[LINK: {one['UID']}, {one['UID']}]",
-            _wiring(one["SECTION"]),
-            "\n\n".join(_LEADS[word.strip()] for word in one["SINGLE"].split(",")),
+            "\n\n".join(
+                [_LEADS[word.strip()] for word in one["SINGLE"].split(",")]
+                + [f"in {_wiring(one['SECTION'])}"]
+            ),
             _line(one["STATEMENT"]),
             _line(one["STAYS"]),
         )
         for one in stay
     ]
-    head = (
-        "what fails",
-        "wiring",
-        "leads to",
-        "what happens",
-        "why it stays, and what you must do",
-    )
-    table = list_table(head, rows, (18, 12, 12, 22, 36))
+    # Five columns are wider than a printed page.
+    head = ("what fails", "leads to, in", "what happens", "why it stays, and what you must do")
+    table = list_table(head, rows, (20, 14, 26, 40))
     kinds = "\n".join(f"- {one.name}: {plain(one.description)}" for one in vehicles().values())
     counted = f"{len(stay)} of {len(failures)} failure modes stay."
     text = f"{_INTRODUCTION}\n{kinds}\n\n{counted}\n\n{table}"

@@ -220,6 +220,7 @@ def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
     assert "missed deploy" in text
     assert "false deploy" in text
     assert text.count("[LINK: ") == 1
+    assert "in mavlink, both" in text
 
 
 @pytest.mark.parametrize(
