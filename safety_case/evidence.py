@@ -18,7 +18,9 @@ _DECIDES = {
 _INTRODUCTION = """
 A run wrote each of these pages, of the version of that day. What was committed since then in
 ``config/profiles``, ``chute_ros/supervisor`` and ``chute_ros/campaign`` is counted, a corrected
-comment as well as a new limit. A page that is older than the rules shows what they were.
+comment as well as a new limit. A page that is older than the rules shows what they were. Where a
+page does not say how long its run took, the commit is the last one that changed a table of it, and
+the run may be older.
 """
 
 

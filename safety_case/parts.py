@@ -15,7 +15,8 @@ from chute_ros.protocol.vehicle_merge import AUTOPILOTS, IMU, ODOMETRY
 from safety_case.documents import ROOT
 
 #: Section of fmea.sdoc -> nodes, devices and sources of the vehicle's state that it speaks of.
-#: A section without any is a part that the code has no list of.
+#: A section without any is a part that the code has no list of. A link has one wire, which stands
+#: in the section of what hangs on it.
 PARTS: Mapping[str, tuple[str, ...]] = {
     "mavlink_parachute: the parachute and its wire": ("parachute",),
     "mavlink_parachute: the autopilot": ("vehicle/state",),
