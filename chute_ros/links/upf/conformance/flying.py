@@ -19,6 +19,8 @@ _MOVES = "it moves through its states, up to ARMED: its APS may fire if it is sh
 MAY_FIRE = "it must not, but it may FIRE"
 #: A state is told so soon after what moves it, s; it fires after so long at most.
 _TOLD_WITHIN, FIRES_WITHIN = 1.5, 4.0
+#: What moves it by itself on a bench does so within this, s.
+_WAITS = 3.0
 #: At rest for 5 s, and a while to tell.
 _RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
 _AUTOMATIC = (p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND)
@@ -130,11 +132,19 @@ def _order(bench: UpfBench) -> Trial:
     return f"{result or 'not answered'}, still READY"
 
 
-def _waits(bench: UpfBench) -> Trial:
-    yield from _by_hand(bench)
-    if (yield from bench.reaches(_S.TAKEOFF, 3.0)):
-        raise failed("Enable Auto-Takeoff is off, and it takes off by itself")
-    return "still READY after 3 s"
+def _stays(name: str, parameter: str, to: ParachuteState, *requests: str) -> UpfClause:
+    """After these requests it does not go on to that state by itself."""
+    state = _AFTER[requests[-1]] if requests else _S.READY
+
+    def trial(bench: UpfBench) -> Trial:
+        yield from _by_hand(bench)
+        yield from _reached(bench, *requests)
+        if (yield from bench.reaches(to, _WAITS)):
+            raise failed(f"{parameter} is off, and it becomes {to.name} by itself")
+        return f"not {to.name} after {_WAITS:g} s"
+
+    text = f"with {parameter} off it stays {state.name}, and is not {to.name} by itself"
+    return clause(_PARAMETERS, name, text, trial, _MOVES, Risk.ARMS)
 
 
 def _disabled(bench: UpfBench) -> Trial:
@@ -227,17 +237,13 @@ CLAUSES: tuple[UpfClause, ...] = (
         Risk.ARMS,
     ),
     *(_excludes(one) for one in p.EXCLUDES),
-    clause(
-        _PARAMETERS,
-        "no-auto-takeoff",
-        "with Enable Auto-Takeoff off it stays READY",
-        _waits,
-        _MOVES,
-        Risk.ARMS,
-    ),
+    _stays("no-auto-takeoff", p.AUTO_TAKEOFF, _S.TAKEOFF),
     clause(_STATES, "arm-order", "it is armed only after a take-off", _order, _MOVES, Risk.ARMS),
     _moves("TYPE_TAKEOFF", _S.TAKEOFF),
+    _stays("no-auto-arm", p.AUTO_ARM, _S.ARMED, "TYPE_TAKEOFF"),
+    _stays("no-auto-land", p.AUTO_LAND, _S.READY, "TYPE_TAKEOFF"),
     _moves("TYPE_ARM", _S.ARMED, "TYPE_TAKEOFF"),
+    _stays("no-auto-disarm", p.AUTO_DISARM, _S.TAKEOFF, "TYPE_TAKEOFF", "TYPE_ARM"),
     _moves("TYPE_DISARM", _S.TAKEOFF, "TYPE_TAKEOFF", "TYPE_ARM"),
     _moves("TYPE_LAND", _S.READY, "TYPE_TAKEOFF"),
     clause(

@@ -30,8 +30,8 @@ from chute_ros.protocol.dronecan.transfer import Kind, head_of
 _S = ParachuteState
 #: It falls silent so long after its first start, for so long, s.
 _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
-#: It takes off by itself after so long, s; and tells no state for so long at first.
-_TAKES_OFF_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
+#: It goes on by itself after so long, s; and tells no state for so long at first.
+_MOVES_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
 #: It is silent for so long after it was first told the time, and after spoilt frames, s.
 _STANDS_STILL, _STUNNED = 6.4, 2.3
 #: Its TriggerStatus comes so seldom, for so long after its first start, s.
@@ -44,6 +44,13 @@ _ANSWERS = {
     "TYPE_ARM": "arm",
     "TYPE_DISARM": "disarm",
     "TYPE_LAND": "land",
+}
+#: The state that it leaves by itself though this is off, and how.
+_BY_ITSELF = {
+    "no-auto-takeoff": (_S.READY, p.AUTO_TAKEOFF, Event.TAKEOFF),
+    "no-auto-arm": (_S.TAKEOFF, p.AUTO_ARM, Event.ARM),
+    "no-auto-disarm": (_S.ARMED, p.AUTO_DISARM, Event.DISARM),
+    "no-auto-land": (_S.TAKEOFF, p.AUTO_LAND, Event.LAND),
 }
 #: What it does not ask of the vehicle.
 _NOT_ASKED = {
@@ -125,17 +132,19 @@ class BrokenController(BrokenNode, UpfController):
         self, definitions: Definitions, settings: ControllerSettings, breaks: str
     ) -> None:
         super().__init__(definitions, settings, breaks)
-        self._ready_since = math.nan
+        self._there_since = math.inf
         if change := _NODE_CHANGES.get(breaks) or _CONTROLLER_CHANGES.get(breaks):
             change(self)
 
     def step(self, now: float) -> None:
         super().step(now)
-        ready = self.state is _S.READY and not self.switch(p.AUTO_TAKEOFF)
-        self._ready_since = min(self._ready_since, now) if ready else math.inf
-        by_itself = now - self._ready_since >= _TAKES_OFF_AFTER
-        if self.breaks == "no-auto-takeoff" and by_itself:
-            self._move(Event.TAKEOFF)
+        if self.breaks not in _BY_ITSELF:
+            return
+        state, parameter, event = _BY_ITSELF[self.breaks]
+        there = self.state is state and not self.switch(parameter)
+        self._there_since = min(self._there_since, now) if there else math.inf
+        if now - self._there_since >= _MOVES_AFTER:
+            self._move(event)
 
     def decide(self, name: str) -> str:
         if name == "" and self.breaks == "unknown-type":
@@ -407,7 +416,7 @@ BREAKS = (
     *_NOT_ASKED,
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
-    *("unknown-type", "no-auto-takeoff", "arm-order", "disabled", "deploy", "touchdown"),
+    *("unknown-type", *_BY_ITSELF, "arm-order", "disabled", "deploy", "touchdown"),
     *(f"{_TRIGGER}{name}" for name in (*_NODE_CHANGES, *_NODE_BREAKS, "node-id")),
     *_TRIGGER_CHANGES,
 )
