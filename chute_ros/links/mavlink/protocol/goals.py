@@ -136,6 +136,7 @@ def release(
     not lost: what a lost device said long ago must not keep us from sending.
     """
     parachute, *others = parachutes
+    before = parachute.armed_triggers
     alive = parachute.liveness.state is not LinkState.LOST and not parachute.overdue(now)
 
     def next_one() -> MavlinkGoal | None:
@@ -158,16 +159,18 @@ def release(
         request_status(parachute),
         insist=force,
         urgent=True,
-        hint=lambda: _why_not_released(parachute, now if force else math.inf),
+        hint=lambda: _why_not_released(parachute, now if force else math.inf, before),
         remark=remark,
         otherwise=next_one,
         patience=patience,
     )
 
 
-def _why_not_released(parachute: ParachuteTracker, armed_since: float) -> str:
+def _why_not_released(
+    parachute: ParachuteTracker, armed_since: float, before: TriggerFlags
+) -> str:
     """What of the device's own words keeps a module from releasing on command. armed_since: when
-    arming on the way began."""
+    arming on the way began; before: what was armed then."""
     hints = []
     if refusal := parachute.arming_refusal(armed_since):
         hints.append(f"arming FC or OFFBOARD on the way: {refusal}")
@@ -179,9 +182,8 @@ def _why_not_released(parachute: ParachuteTracker, armed_since: float) -> str:
         hints.append(f"armed triggers: {armed}; {need}, which force arms on the way")
     if not parachute.ground_cleared:
         hints.append("its own status does not report GROUND_CLEARED")
-    if armed_since < math.inf and parachute.armed_triggers:
-        now = ", ".join(flag_names(parachute.armed_triggers))
-        hints.append(f"it is ARMED now ({now}): on the ground disarm it")
+    if armed_since < math.inf and (anew := parachute.armed_triggers & ~before):
+        hints.append(f"it is ARMED now ({', '.join(flag_names(anew))}): on the ground disarm it")
     return "; ".join(hints)
 
 
