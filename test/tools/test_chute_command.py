@@ -495,10 +495,15 @@ def publisher_of(scene, kind, topic, message, profile=qos.STATUS):
 
 
 def test_healthy_diagnostics_are_well(ready):
-    code, out, _ = run(ready.bench, "diagnostics", "--json")
-    told = json.loads(out)
-    assert {one["level"] for one in told["tasks"]} <= {"OK", "WARN"}
-    assert code == 0
+    def well():
+        code, out, _ = run(ready.bench, "diagnostics", "--json")
+        assert (code == 0) == (
+            {one["level"] for one in json.loads(out)["tasks"]} <= {"OK", "WARN"}
+        )
+        return code == 0
+
+    # Words that a busy machine held up look like another clock, for some seconds.
+    ready.bench.until(well, "all is well")
 
 
 @pytest.mark.parametrize("beating", [True, False])
