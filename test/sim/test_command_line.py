@@ -1,6 +1,5 @@
 """The simulators as executables: without ROS, with every mistake told in one line."""
 
-import os
 import re
 import signal
 import socket
@@ -10,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from missing_modules import environment_without
 from printing_process import PrintingProcess
 
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -24,25 +24,6 @@ LOCAL = "127.0.0.1"
 MSG_DEFS = Path(__file__).parents[2] / "msg_defs"
 #: Makes `import rclpy` fail as on a machine without ROS.
 ROS = ("rclpy", "rosidl_runtime_py", "rpyutils")
-NO_ROS = """
-import sys
-
-
-class NoRos:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {names}:
-            raise ImportError(f"no ROS here: {{name}}")
-
-
-sys.meta_path.insert(0, NoRos())
-"""
-
-
-def environment_without(names, folder):
-    """An environment in which these modules cannot be imported."""
-    (folder / "sitecustomize.py").write_text(NO_ROS.format(names=names))
-    path = os.pathsep.join([str(folder), *filter(None, sys.path)])
-    return {**os.environ, "PYTHONPATH": path}
 
 
 @pytest.fixture

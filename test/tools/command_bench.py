@@ -19,14 +19,20 @@ def call(command: ModuleType, monkeypatch, *arguments: str) -> None:
     command.main()
 
 
-def assert_refused(command: ModuleType, monkeypatch, capsys, arguments, words: str) -> None:
-    """A mistake is said at once, and nothing is begun."""
+def refused(command: ModuleType, monkeypatch, capsys, *arguments: str) -> tuple[str, str]:
+    """Called with a mistake: output and errors as it ends with 2."""
     with pytest.raises(SystemExit) as ended:
         call(command, monkeypatch, *arguments)
     assert ended.value.code == 2
-    told = capsys.readouterr()
-    assert words in told.err
-    assert told.out == ""
+    out, errors = capsys.readouterr()
+    return out, errors
+
+
+def assert_refused(command: ModuleType, monkeypatch, capsys, arguments, words: str) -> None:
+    """A mistake is said at once, and nothing is begun."""
+    out, errors = refused(command, monkeypatch, capsys, *arguments)
+    assert words in errors
+    assert out == ""
 
 
 #: As its executable, but it tells how far it is from the first flight on. orjson crashes by a

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -15,10 +14,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from command_bench import refused
 from conformance_processes import COMMAND, started
 from junitparser import JUnitXml
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from missing_modules import environment_without
 
 import chute_ros
 from chute_ros.conformance.clause import ASKS, READS, SOAK
@@ -198,16 +199,6 @@ def test_a_wire_that_is_not_there_is_told_at_once() -> None:
     assert "/dev/not_there" in errors
 
 
-def refused(monkeypatch, capsys, *arguments: str) -> tuple[str, str]:
-    """What the command, called here, says as it ends with a mistake: output and errors."""
-    monkeypatch.setattr(sys, "argv", ["conformance", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        command.main()
-    assert ended.value.code == 2
-    told: tuple[str, str] = capsys.readouterr()
-    return told
-
-
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -221,7 +212,7 @@ def refused(monkeypatch, capsys, *arguments: str) -> tuple[str, str]:
 def test_a_mistake_in_the_command_line_ends_with_2(
     arguments: list[str], told: str, monkeypatch, capsys
 ) -> None:
-    out, errors = refused(monkeypatch, capsys, *arguments)
+    out, errors = refused(command, monkeypatch, capsys, *arguments)
     assert out == ""
     assert f"conformance: {told}" in errors
 
@@ -246,7 +237,7 @@ def test_a_mistake_ends_the_process_with_2() -> None:
 def test_a_number_that_cannot_be_is_refused_with_what_can(
     device: str, option: str, value: str, told: str, monkeypatch, capsys
 ) -> None:
-    _, errors = refused(monkeypatch, capsys, device, option, value)
+    _, errors = refused(command, monkeypatch, capsys, device, option, value)
     assert errors.endswith(f"conformance {device}: error: argument {option}: {told}\n")
 
 
@@ -301,21 +292,8 @@ def test_clauses_of_another_kind_of_device_are_counted_in_one_line(tmp_path: Pat
 
 # -- without ROS --------------------------------------------------------------------------------
 
-#: Makes an import fail as on a machine without ROS, on which the dialect alone was generated.
-NO_ROS = """
-import sys
-
-ROS = ("rclpy", "builtin_interfaces", "rosidl", "ament", "rpyutils", "chute_msgs.msg")
-
-
-class NoRos:
-    def find_spec(self, name, path=None, target=None):
-        if name.startswith(ROS):
-            raise ImportError(f"no ROS here: {name}")
-
-
-sys.meta_path.insert(0, NoRos())
-"""
+#: As on a machine without ROS, on which the dialect alone was generated.
+ROS = ("rclpy*", "builtin_interfaces", "rosidl*", "ament*", "rpyutils", "chute_msgs.msg")
 #: Device -> its simulator, the clause that is tried, and the folder of its messages.
 WITHOUT_ROS = {
     "mavlink": ("chute_ros.links.mavlink.simulator.sim_mavlink_parachute", "request-status", ()),
@@ -335,9 +313,7 @@ WITHOUT_ROS = {
 @pytest.fixture
 def without_ros(tmp_path: Path) -> dict[str, str]:
     """An environment in which nothing of ROS can be imported."""
-    (tmp_path / "sitecustomize.py").write_text(NO_ROS)
-    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
-    return {**os.environ, "PYTHONPATH": path}
+    return environment_without(ROS, tmp_path)
 
 
 def connections(device: str, folder: Path) -> tuple[list[str], str]:
@@ -386,11 +362,8 @@ def test_what_one_option_alone_needs_is_named(
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == package else right(name)
     )
-    monkeypatch.setattr(sys, "argv", ["conformance", "mavlink", option, str(tmp_path / "a")])
-    with pytest.raises(SystemExit) as ended:
-        command.main()
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == (
+    _, errors = refused(command, monkeypatch, capsys, "mavlink", option, str(tmp_path / "a"))
+    assert errors == (
         f"conformance: {option}: {package} is not installed: "
         f"`python3 -m pip install {package}` brings it\n"
     )

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import pytest
 
-from chute_ros.conformance.clause import ASKS, READS, SOAK, Clause, Result, Risk, Verdict
+from chute_ros.conformance.clause import (
+    ASKS,
+    READS,
+    SOAK,
+    Clause,
+    Packet,
+    Result,
+    Risk,
+    Verdict,
+)
 from chute_ros.conformance.kit import Kit
 from chute_ros.conformance.session import Allowed, Session
 from chute_ros.conformance.virtual import VirtualLine
@@ -17,6 +27,16 @@ KITS: dict[str, Kit] = {one.device: load(one.kit) for one in links().values() if
 ALONE = [(device, clause) for device, kit in KITS.items() for clause in kit.clauses]
 
 
+def tried(
+    device: str, clauses: Sequence[Clause[object]], needs: str
+) -> tuple[list[Result], Sequence[Packet]]:
+    """Of a sound device with these options and all risks: results, and the whole traffic."""
+    sound, bench = KITS[device].simulated("", needs or SOAK)
+    line = VirtualLine(Session(bench, clauses, Allowed(Risk.FIRES, needs.split())), sound)
+    line.run()
+    return [one for one in line.events if isinstance(one, Result)], bench.traffic
+
+
 @pytest.mark.parametrize(
     ("device", "clause"), ALONE, ids=[f"{device}-{one.name}" for device, one in ALONE]
 )
@@ -24,10 +44,7 @@ def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     device: str, clause: Clause[object]
 ) -> None:
     """Given --only and the options that the clause needs."""
-    sound, bench = KITS[device].simulated("", clause.needs or SOAK)
-    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, clause.needs.split())), sound)
-    line.run()
-    (result,) = (one for one in line.events if isinstance(one, Result))
+    (result,), _ = tried(device, [clause], clause.needs)
     assert result.verdict in (Verdict.PASSED, Verdict.NOT_TRIED), result.why
     assert result.proof or result.verdict is Verdict.NOT_TRIED
 
@@ -42,12 +59,8 @@ def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     ],
 )
 def test_each_clause_that_passes_has_packets_that_prove_it(device: str, needs: str) -> None:
-    sound, bench = KITS[device].simulated("", needs)
-    allowed = Allowed(Risk.FIRES, needs.split())
-    line = VirtualLine(Session(bench, KITS[device].clauses, allowed), sound)
-    line.run()
-    passed = [one for one in line.events if isinstance(one, Result)]
-    passed = [one for one in passed if one.verdict is Verdict.PASSED]
+    results, _ = tried(device, KITS[device].clauses, needs)
+    passed = [one for one in results if one.verdict is Verdict.PASSED]
     assert len(passed) > 20
     assert [one.clause.name for one in passed if not one.proof] == []
 
@@ -76,8 +89,6 @@ ASKING = {
 def test_a_clause_that_does_more_than_ask_says_what_the_device_may_do(
     device: str, clause: Clause[object]
 ) -> None:
-    sound, bench = KITS[device].simulated("", clause.needs or SOAK)
-    line = VirtualLine(Session(bench, [clause], Allowed(Risk.FIRES, clause.needs.split())), sound)
-    line.run()
-    sent = [f"{one.name} {one.text}" for one in bench.traffic if one.sent]
+    _, traffic = tried(device, [clause], clause.needs)
+    sent = [f"{one.name} {one.text}" for one in traffic if one.sent]
     assert [one for one in sent if not re.fullmatch(ASKING[device], one)] == []

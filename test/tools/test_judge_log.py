@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from command_bench import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_bench import FAILS, FAILS_AT, FORMATS, HEIGHT, LANDED_AT, LANDS, Told, dataflash, flown
@@ -366,15 +367,6 @@ def begun(landed: list[Told], folder: Path) -> Path:
     return FORMATS["flight.tlog"]([one for one in landed if one.at < 3.0], folder / "begun.tlog")
 
 
-def refused(monkeypatch, capsys, *arguments: object) -> str:
-    """What it says as it ends with a mistake; called here, and not as a process."""
-    monkeypatch.setattr(sys, "argv", ["judge_log", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        command.main()
-    assert ended.value.code == 2
-    return capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -386,7 +378,9 @@ def refused(monkeypatch, capsys, *arguments: object) -> str:
 )
 def test_a_wrong_argument_is_refused(arguments, says, landed, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert says in refused(monkeypatch, capsys, begun(landed, tmp_path), *arguments)
+    log = str(begun(landed, tmp_path))
+    _, errors = refused(command, monkeypatch, capsys, log, *map(str, arguments))
+    assert says in errors
     assert not (tmp_path / "judged.html").exists()
 
 
@@ -409,7 +403,7 @@ def test_no_page_goes_over_a_log_or_what_is_known_of_it(landed, tmp_path, monkey
         ("--page", known, "--known", known),
         ("--table", known, "--known", known),
     ):
-        told = refused(monkeypatch, capsys, log, *arguments)
+        _, told = refused(command, monkeypatch, capsys, *map(str, (log, *arguments)))
         assert f"{arguments[1]} is read here: nothing is written over it" in told
     assert (log.read_bytes(), known.read_bytes()) == before
 
