@@ -332,9 +332,10 @@ class FlightComputer:
         """Whether it flies: a ground mode after a restart in the air, and a mode without a name or
         a fault, say nothing of it until its altitude stays."""
         if self.mode in IN_FLIGHT:
-            if not self.flying:
+            flies = not self.landed
+            if flies and not self.flying:
                 self.restarted_in_flight = False  # what happened in another flight
-            self.flying = not self.landed
+            self.flying = flies
         elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
             self.flying = False
 
