@@ -94,13 +94,12 @@ class RecordingBench(Generic[HeardT]):
         self.watched = [one for one in self.heard if one.at >= began]
         return ""
 
-    def watch_once(self, seconds: float, *kinds: str) -> Trial:
+    def watch_once(self, seconds: float, *kinds: str) -> Any:
         """The same, unless something was watched before: for a clause that looks at what another
-        one has watched (of these kinds; none: all), and may be tried without it."""
+        one has watched, and may be tried without it. All of it, of these kinds (none: all)."""
         if not self.watched:
             yield from self.watch(seconds)
-        self.look_at(one for one in self.watched if not kinds or one.kind in kinds)
-        return ""
+        return self.look_at(one for one in self.watched if not kinds or one.kind in kinds)
 
     def watch_on(self, seconds: float) -> Trial:
         """Let so long pass."""

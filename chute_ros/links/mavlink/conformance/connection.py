@@ -36,8 +36,7 @@ def nominal(bench: MavlinkBench, kind: str) -> str:
 
 
 def _heartbeat_type(bench: MavlinkBench) -> Trial:
-    yield from bench.watch_once(WATCHED, "HEARTBEAT")
-    beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
+    beats = yield from bench.watch_once(WATCHED, "HEARTBEAT")
     kinds = {one.message.type for one in beats}
     if kinds != {dialect.MAV_TYPE_PARACHUTE}:
         names = [entry_name("MAV_TYPE", kind) for kind in sorted(kinds)]
@@ -47,8 +46,7 @@ def _heartbeat_type(bench: MavlinkBench) -> Trial:
 
 
 def _heartbeat_fields(bench: MavlinkBench) -> Trial:
-    yield from bench.watch_once(WATCHED, "HEARTBEAT")
-    beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
+    beats = yield from bench.watch_once(WATCHED, "HEARTBEAT")
     if not beats:
         raise not_tried("no HEARTBEAT came")
     for one in beats:

@@ -81,8 +81,7 @@ def _node_status(bench: UpfBench) -> Trial:
 
 
 def _node_mode(bench: UpfBench) -> Trial:
-    yield from bench.watch_once(WATCHED, NODE_STATUS)
-    if not (told := _node_statuses(bench)):
+    if not (told := (yield from bench.watch_once(WATCHED, NODE_STATUS))):
         raise not_tried("no NodeStatus came")
     # It may tell its state before the NodeStatus that goes with it.
     since = told[-1].at - _LONGEST_STATUS * (1.0 + _SHARE)
@@ -120,8 +119,7 @@ def _statistics(bench: UpfBench) -> Trial:
 
 
 def _uptime(bench: UpfBench) -> Trial:
-    yield from bench.watch_once(WATCHED, NODE_STATUS)
-    told = _node_statuses(bench)
+    told = yield from bench.watch_once(WATCHED, NODE_STATUS)
     if len(told) < 2:
         raise not_tried("NodeStatus came too seldom")
     first, last = told[0], told[-1]

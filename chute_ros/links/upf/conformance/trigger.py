@@ -23,12 +23,10 @@ from chute_ros.links.upf.protocol import definitions as names
 
 #: The option with which it is fired by the broadcast, in place of the service.
 BROADCAST = "--broadcast"
-#: What holds for a trigger as for a controller.
+#: What holds for a trigger as for a controller, beside frames and node ids.
 SHARED = (
     *("node-status", "node-mode", "uptime", "node-info", "transport-stats", "parameter-list"),
     *("parameter-unknown", "opcode-save", "restart-magic", "restart", "time-sync", "soak"),
-    *("other-node", "dna", "dna-forgets", "lost-frame", "reordered-frames", "doubled-frames"),
-    *("cut-transfer", "wrong-crc", "foreign-frames"),
 )
 _EVERY = "every trigger on the bus"
 
@@ -214,7 +212,6 @@ _of: Callable[..., UpfClause] = partial(clause, needs=TRIGGER)
 _may_fire: Callable[..., UpfClause] = partial(_of, risk=Risk.FIRES)
 _MAY_ALL = f"{MAY_FIRE}, and so may {_EVERY}"
 _NODE, _TYPES = "Node discovery", "UPF protocols"
-_ALL = (*standard.CLAUSES, *wire.CLAUSES, *node_id.CLAUSES)
 CLAUSES: tuple[UpfClause, ...] = (
     _of(_TYPES, "trigger-status", "TriggerStatus is broadcast", _status, READS),
     _of(
@@ -230,7 +227,8 @@ CLAUSES: tuple[UpfClause, ...] = (
         "the static node id of a trigger as delivered is 34",
         standard.node_id,
     ),
-    *(_of_trigger(one) for one in _ALL if one.name in SHARED),
+    *(_of_trigger(one) for one in standard.CLAUSES if one.name in SHARED),
+    *map(_of_trigger, (*wire.CLAUSES, *node_id.CLAUSES)),
     _may_fire(
         _TYPES,
         "trigger-bad-magic",
