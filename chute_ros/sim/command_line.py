@@ -29,6 +29,7 @@ from chute_ros.transport.wire_events import LoopFault, WireChange
 
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
+    from chute_ros.sim.motion import Motion
 
 #: What ends a simulator.
 _ENDS = (signal.SIGINT, signal.SIGTERM)
@@ -190,6 +191,20 @@ def run_on_can(
     _hold_signals()
     with beside:
         _run_link(device, link, wires, options)
+
+
+def sensing_for(
+    options: argparse.Namespace,
+    felt: Callable[[Motion], None],
+    released: Callable[[], bool],
+) -> contextlib.AbstractContextManager[None]:
+    """What runs beside a device that --vehicle lets feel a vehicle, and open its canopy."""
+    if not options.vehicle:
+        return contextlib.nullcontext()
+    # Here: without a vehicle neither pymavlink nor the dialect is needed.
+    from chute_ros.sim.vehicle_sense import sensing
+
+    return sensing(options.vehicle, options.system_id, felt, released)
 
 
 def run_on_pty(

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from chute_ros.links.relay.simulator.relay_board import RelayBoard
-from chute_ros.sim.command_line import main_of, number, parser_on_pty, run_on_pty, script_of
+from chute_ros.sim.command_line import (
+    main_of,
+    number,
+    parser_on_pty,
+    run_on_pty,
+    script_of,
+    sensing_for,
+)
 from chute_ros.transport.address import FORMS
 
 
@@ -24,13 +31,7 @@ def _run() -> None:
     chosen = options.parse_args()
     board = RelayBoard(script_of(chosen.at))
 
-    sense = None
-    if chosen.vehicle:
-        # Here: without a vehicle neither pymavlink nor the dialect is needed.
-        from chute_ros.sim.vehicle_sense import sensing
-
-        sense = sensing(chosen.vehicle, chosen.system_id, lambda motion: None, lambda: board.fired)
-    run_on_pty(board, chosen, sense)
+    run_on_pty(board, chosen, sensing_for(chosen, lambda motion: None, lambda: board.fired))
 
 
 def main() -> None:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
-
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
-from chute_ros.sim.command_line import main_of, number, parser, real, run_on_can, script_of
+from chute_ros.sim.command_line import (
+    main_of,
+    number,
+    parser,
+    real,
+    run_on_can,
+    script_of,
+    sensing_for,
+)
 from chute_ros.transport.address import FORMS
 
 
@@ -106,17 +112,9 @@ def _run() -> None:
     if not nodes:
         raise ParameterError("--no-controller and --no-trigger: nothing to simulate")
 
-    sense: AbstractContextManager[None] = nullcontext()
-    if chosen.vehicle:
-        # Here: without a vehicle neither pymavlink nor the dialect is needed.
-        from chute_ros.sim.vehicle_sense import sensing
-
-        sense = sensing(
-            chosen.vehicle,
-            chosen.system_id,
-            lambda motion: setattr(controller, "motion", motion),
-            lambda: trigger.fired,
-        )
+    sense = sensing_for(
+        chosen, lambda motion: setattr(controller, "motion", motion), lambda: trigger.fired
+    )
     run_on_can(UpfBus(nodes, script_of(chosen.at)), chosen, sense)
 
 
