@@ -141,7 +141,7 @@ def report(
                 rows.append((f"{which}, {how}: {peer.name}", *cells, str(peer.missed[how])))
     for name, took in deploys.items():
         cells = compared(took, deploys[NOBODY], "{:.2f} ms")
-        rows.append((f"deploy, idle: {name}", *cells, "0"))
+        rows.append((f"deploy, idle: {name}", *cells, ""))
     nodes, onlooker = "the three nodes", "who looks"
     costs = [(name, f"{mine:.1f} %", f"{its:.1f} %") for name, (mine, its) in cost.items()]
     return (

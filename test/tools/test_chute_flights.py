@@ -266,5 +266,6 @@ def test_a_rocket_whose_drogue_a_person_releases(namespace, terminal, command, t
         terminal.orders("deploy", "--yes", "--reason", "no drogue")
         told = terminal.sees_state("DEPLOYED")
         assert told["parachutes"][0]["deployed"]
+        assert terminal.chute("status")[1].startswith("DEPLOYED\n")
     finally:
         processes.end()
