@@ -108,6 +108,15 @@ def test_it_is_on_the_ground_again_once_its_altitude_stays():
     assert status(rocket, now).faults == ()
 
 
+def test_a_restart_stays_known_after_a_landing_under_a_canopy():
+    """Given a flight computer that goes on in its mode of the flight, and lands in it."""
+    rocket, now = restarted_in_flight()
+    now = rocket.descends(now + 1.0, 6.0, MAIN, 10.0)
+    now = rocket.descends(now, 6.0, MAIN, 0.0, 0.0)
+    assert rocket.computer.landed
+    assert vehicle(rocket, now).rebooted_in_flight
+
+
 def test_the_next_flight_knows_nothing_of_a_restart_in_the_one_before():
     """A flight computer that is not switched off between two flights."""
     rocket, now = restarted_in_flight()
