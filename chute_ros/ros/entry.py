@@ -155,6 +155,9 @@ def _security() -> bool:
 def _refused(name: str, error: RuntimeError) -> NoReturn:
     """In one line why ROS did not let it start."""
     text = " ".join(str(error).partition(", at /")[0].split())
+    if text.startswith("["):
+        # Of arguments that it does not know ROS tells the list alone.
+        text = f"ROS has no argument {text.strip('[]')}: a parameter is set by -p NAME:=VALUE"
     if _security():
         text += (
             " (ROS_SECURITY_ENABLE is true: docs/guide/security.md lists the needed keystore, "

@@ -48,6 +48,10 @@ REFUSED = [
     (("--params-file",), "Couldn't parse trailing --params-file flag"),
     (("-r",), "Couldn't parse trailing -r flag"),
     (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
+    (
+        ("mode:=SHADOW",),
+        "ROS has no argument 'mode:=SHADOW': a parameter is set by -p NAME:=VALUE",
+    ),
     (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
     (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
     (("-p", "nobody:mode:=SHADOW"), "'-p nobody:mode:=SHADOW' is for a node /nobody, this"),
