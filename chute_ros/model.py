@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 NAN = math.nan
 
@@ -260,6 +260,14 @@ class VehicleState:
     height_holds: bool = False
     #: Why this vehicle must not take off, as its source says it, in words.
     faults: tuple[str, ...] = ()
+
+    def aged(self, by: float) -> VehicleState:
+        """The same picture, by seconds later."""
+        return replace(self, **{name: getattr(self, name) + by for name in _AGES})
+
+
+#: Fields of VehicleState that tell an age.
+_AGES = tuple(one.name for one in fields(VehicleState) if one.name.endswith("_age"))
 
 
 class Airframe(enum.Enum):

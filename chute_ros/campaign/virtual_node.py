@@ -15,7 +15,7 @@ from chute_ros.model import Decision
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import DeviceRuntime
-from chute_ros.runtime.topics import ParachuteTold, SafetyPicture, SupervisorBeat
+from chute_ros.runtime.topics import ParachuteTold, SafetyPicture, SupervisorBeat, VehicleTold
 from chute_ros.supervisor.decision_gate import Verdict
 
 _HEARTBEAT_INTERVAL = 0.1  # s
@@ -91,6 +91,8 @@ class VirtualNode(Plug):
         if isinstance(message, ParachuteTold):
             message = message.report
             self.knows_release |= message.status.deployed
+        elif isinstance(message, VehicleTold):
+            message = message.report
         elif isinstance(message, KeepTable):
             self.link.table_kept(message.number, self._ros.world.now)
         return self._ros.publish(self.process, message)

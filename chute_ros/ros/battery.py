@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import time
+from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 
 from chute_ros import model
-from chute_ros.ros import messages, qos
+from chute_ros.ros import qos
 
-#: The age of one reading is read a little later each time, by as much as a busy processor takes;
-#: autopilots report batteries no more often than this, s.
-_APART = 0.05
+#: One reading has the same time in each picture but for what floating point makes of its age, s.
+_ROUNDING = 1e-6
 
 
 class BatteryPublisher:
-    """Publishes each new reading on vehicle/battery."""
+    """Publishes each new reading on vehicle/battery. node: a SuiteNode."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Any) -> None:
+        self._node = node
         self._publisher = node.create_publisher(BatteryState, "vehicle/battery", qos.STATUS)
-        self._measured_at = -1.0
+        self._received = -1.0
 
-    def publish(self, state: model.VehicleState, stamp: Time) -> None:
-        """A picture of the vehicle, which may have no new reading. stamp: when it was made."""
-        measured_at = time.monotonic() - state.battery_age
+    def publish(self, state: model.VehicleState, at: float) -> None:
+        """A picture of the vehicle, which may have no new reading. at: when its ages were counted,
+        monotonic s."""
+        received = at - state.battery_age
         # Nor if the age is NaN: none was received.
-        if not measured_at > self._measured_at + _APART:
+        if not received > self._received + _ROUNDING:
             return
-        self._measured_at = measured_at
-        received = messages.nanoseconds(stamp) - round(state.battery_age * 1e9)
-        self._publisher.publish(battery_state(state, messages.stamp_of(received)))
+        self._received = received
+        self._publisher.publish(battery_state(state, self._node.wall_at(received)))
 
 
 def battery_state(state: model.VehicleState, stamp: Time) -> BatteryState:

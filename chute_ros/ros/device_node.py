@@ -6,7 +6,6 @@ Events go to the executor, which is the runtime's owner, through an inbox and a 
 
 from __future__ import annotations
 
-import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -156,12 +155,6 @@ class DeviceNode(SuiteNode, ABC):
         """Have follower(it, its stamp) called with what the runtime publishes of this kind."""
         self._followers[kind] = follower
 
-    def receipt(self, received: float, stamp: Time) -> Time:
-        """When data was received (monotonic s), by the wall clock; NaN, never: 0. stamp: now."""
-        if math.isnan(received):
-            return Time()
-        return messages.before(stamp, time.monotonic() - received)
-
     def rate(self, received: int) -> float:
         """How often something counted came since this was last asked, 1/s."""
         now = time.monotonic()
@@ -274,7 +267,7 @@ class DeviceNode(SuiteNode, ABC):
         self._request_publisher.publish(messages.device_request(one, stamp))
 
     def _parachute(self, one: ParachuteTold, stamp: Time) -> None:
-        status, at = one.report.status, self.receipt(one.received, stamp)
+        status, at = one.report.status, self.wall_at(one.received)
         self.statuses[status.device] = status
         message = messages.parachute_status(status, one.report.link, at)
         self._status_publisher.publish(message)

@@ -249,7 +249,7 @@ class SafetySupervisorNode(SuiteNode):
 
     def _publish_past(self, past: PastDecision, stamp: Time) -> None:
         """With the stamp of when it was decided."""
-        decided = messages.before(stamp, max(0.0, time.monotonic() - past.decided_at))
+        decided = self.wall_at(past.decided_at)
         self._history_publisher.publish(messages.decision(past.decision, decided))
 
     def _publish_beat(self, beat: SupervisorBeat, stamp: Time) -> None:

@@ -10,7 +10,7 @@ from chute_msgs.msg import LinkHeartbeat
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from chute_ros.ros import diagnostics, messages, qos
+from chute_ros.ros import diagnostics, messages, qos, two_clocks
 from chute_ros.ros.parameters import declare, settings_taken
 from chute_ros.ros.plain_border import (
     PlainLogger,
@@ -78,6 +78,10 @@ class SuiteNode(Node):
     def stamp(self) -> Any:
         """The wall clock, for headers."""
         return self.wall.now().to_msg()
+
+    def wall_at(self, instant: float) -> Any:
+        """The wall clock at an instant of the monotonic clock (s); NaN, never: 0."""
+        return messages.stamp_of(two_clocks.wall_at(instant))
 
     def difference(self, stamp: Any) -> float:
         """The wall clock here less a stamp, s."""

@@ -28,7 +28,13 @@ from chute_ros.protocol.events import (
 from chute_ros.runtime.decisions import DecisionCarrier
 from chute_ros.runtime.requests import Begin, CallFailed, RequestTracker
 from chute_ros.runtime.shell import Shell
-from chute_ros.runtime.topics import DeviceBeat, ParachuteTold, SafetyPicture, SupervisorBeat
+from chute_ros.runtime.topics import (
+    DeviceBeat,
+    ParachuteTold,
+    SafetyPicture,
+    SupervisorBeat,
+    VehicleTold,
+)
 from chute_ros.runtime.watch import SupervisorWatch
 from chute_ros.settings import Settings, parameter
 from chute_ros.supervisor.inputs import ParachuteReport, VehicleReport
@@ -212,7 +218,9 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
             picture = ParachuteReport(self.name, event.status)
             self.shell.publish(ParachuteTold(picture, event.received))
         elif isinstance(event, VehicleChanged):
-            self.shell.publish(VehicleReport(event.state))
+            # It has waited for its turn: no part of it is as new as it was.
+            picture = VehicleReport(event.state.aged(now - event.made))
+            self.shell.publish(VehicleTold(picture, now))
         elif isinstance(event, RequestReport):
             report = event.report
             self.desk.report(report.token, report.outcome, report.detail)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from chute_ros.model import Action, Decision, LinkState
 from chute_ros.protocol.events import Ask
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.inputs import ActionReport, ParachuteReport
+from chute_ros.supervisor.inputs import ActionReport, ParachuteReport, VehicleReport
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.state import State
@@ -37,6 +37,15 @@ class ParachuteTold:
 
     report: ParachuteReport
     received: float
+
+
+@dataclass(frozen=True)
+class VehicleTold:
+    """A device node's picture of the vehicle (vehicle/state). at: when its ages were counted,
+    monotonic s."""
+
+    report: VehicleReport
+    at: float
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """A node ends by Ctrl-C between two callbacks, and where one never returns all the same."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -42,7 +43,8 @@ entry.run("itself", "itself:Itself")
 
 @pytest.mark.parametrize(
     ("hangs", "code", "told"),
-    [(False, 0, "begun\nkept\n"), (True, -signal.SIGALRM, "begun\n")],
+    # ROS shuts down in a thread of its own: meanwhile the callback may come again.
+    [(False, 0, "(begun\nkept\n)+"), (True, -signal.SIGALRM, "begun\n")],
     ids=["one that returns", "one that never returns"],
 )
 def test_a_callback_in_which_ctrl_c_comes_is_not_cut_in_two(hangs, code, told, namespace):
@@ -51,5 +53,6 @@ def test_a_callback_in_which_ctrl_c_comes_is_not_cut_in_two(hangs, code, told, n
     done = subprocess.run(
         [*command, *arguments], capture_output=True, text=True, timeout=60.0, check=False
     )
-    assert (done.returncode, done.stdout) == (code, told), done.stderr
+    assert done.returncode == code, done.stderr
+    assert re.fullmatch(told, done.stdout), done.stdout
     assert "Traceback" not in done.stderr

@@ -30,8 +30,8 @@ from chute_ros.ros import messages, qos
 from chute_ros.ros.battery import BatteryPublisher
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.runtime.device import Summary
+from chute_ros.runtime.topics import VehicleTold
 from chute_ros.settings import settings_from
-from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
@@ -59,7 +59,7 @@ class MavlinkParachuteNode(DeviceNode):
         )
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self._battery = BatteryPublisher(self)
-        self.follow(VehicleReport, self._vehicle)
+        self.follow(VehicleTold, self._vehicle)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
         self.serve(RequestMessage, "~/request_message", self._request_message)
@@ -93,9 +93,10 @@ class MavlinkParachuteNode(DeviceNode):
             self._signing.task(name),
         ]
 
-    def _vehicle(self, report: VehicleReport, stamp: Time) -> None:
-        self._vehicle_publisher.publish(messages.vehicle_state(report.state, stamp))
-        self._battery.publish(report.state, stamp)
+    def _vehicle(self, told: VehicleTold, stamp: Time) -> None:
+        state = told.report.state
+        self._vehicle_publisher.publish(messages.vehicle_state(state, self.wall_at(told.at)))
+        self._battery.publish(state, told.at)
 
     def _tell_doubts(self, doubts: tuple[str, ...]) -> None:
         for doubt in set(doubts) - self._doubts:

@@ -25,8 +25,8 @@ from chute_ros.ros import diagnostics, messages, qos
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.ros.link_log import log_notice
 from chute_ros.runtime.device import Summary
+from chute_ros.runtime.topics import VehicleTold
 from chute_ros.settings import settings_from
-from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_serial_address
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
@@ -60,8 +60,10 @@ class UmbilicalNode(DeviceNode):
         if settings.publish_vehicle_state:
             vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
             self.follow(
-                VehicleReport,
-                lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at)),
+                VehicleTold,
+                lambda one, stamp: vehicle.publish(
+                    messages.vehicle_state(one.report.state, self.wall_at(one.at))
+                ),
             )
         for kind, follower in (
             (events.TelemetryReceived, self._telemetry),
@@ -85,7 +87,8 @@ class UmbilicalNode(DeviceNode):
     # -- what only this node's link tells -------------------------------------------------------
 
     def _telemetry(self, event: events.TelemetryReceived, stamp: Time) -> None:
-        self._telem_publisher.publish(telem(event.record, event.sequence, stamp))
+        received = self.wall_at(event.record.received)
+        self._telem_publisher.publish(telem(event.record, event.sequence, received))
 
     def _progressed(self, event: events.Progress, stamp: Time) -> None:
         self._progress = event

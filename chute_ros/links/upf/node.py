@@ -100,7 +100,7 @@ class UpfCanNode(DeviceNode):
     def _publish_trigger(self, event: TriggerChanged, stamp: Time) -> None:
         state = _TRIGGER_STATES.get(event.picture["state"], TriggerStatus.UNKNOWN)
         message = TriggerStatus(link=self.get_name(), **{**event.picture, "state": state})
-        message.header.stamp = self.receipt(event.received, stamp)
+        message.header.stamp = self.wall_at(event.received)
         self._trigger_publisher.publish(message)
 
     def _keep(self, event: KeepTable) -> None:

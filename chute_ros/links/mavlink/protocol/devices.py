@@ -317,4 +317,4 @@ class Devices(EventLog):
         return autopilot.reboot_count > reboots
 
     def _vehicle_changed(self, now: float) -> None:
-        self._events.append(VehicleChanged(self.vehicle_state(now)))
+        self._events.append(VehicleChanged(self.vehicle_state(now), now))

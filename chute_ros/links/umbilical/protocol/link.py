@@ -290,7 +290,7 @@ class UmbilicalLink(EventLog):
     def _tell_picture(self, now: float) -> None:
         status, received = self.computer.status(now, self.pause), self.computer.liveness.last_heard
         self._events.append(ParachuteChanged(status, received))
-        self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
+        self._events.append(VehicleChanged(self.computer.vehicle_state(now), now))
 
     def _changed(self, changes: list[LinkChange]) -> None:
         self.link_changed(DEVICE.replace("_", " "), changes)
