@@ -19,6 +19,9 @@ from safety_case.parts import ACTIONS, PARTS, without_section
 MODES = ("late", "lost", "wrong", "twice", "restarted", "forged")
 KINDS = ("not given", "given wrongly", "too early", "too late", "stopped too soon")
 
+#: Who learns of a failure that stays before it does harm, the fewest first.
+TOLD = ("NOBODY", "FLIGHT", "GROUND", "GROUND, FLIGHT")
+
 #: Folders of the tests; and of the modules each of which, or whose folder, a requirement names.
 TESTS = ("test/", "msg_defs/test/")
 MODULES = ("chute_ros/supervisor", "chute_ros/runtime", "chute_ros/links")
@@ -130,6 +133,8 @@ def _incomplete(
 def _of_failure(row: Node) -> Iterable[str]:
     if ("NONE" in _words(row, "SINGLE")) == bool(row.get("STAYS")):
         yield f"{row['UID']}: STAYS says why a single failure stays; without one it is left out"
+    if (row.get("TOLD") in TOLD) != bool(row.get("STAYS")):
+        yield f"{row['UID']}: TOLD says who learns of what stays: {'; '.join(TOLD)}"
 
 
 def _without_parents(row: Node) -> Iterable[str]:

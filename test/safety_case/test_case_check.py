@@ -197,9 +197,17 @@ def test_what_the_code_has_needs_a_section(monkeypatch, table, section, told):
 @pytest.mark.parametrize(("single", "stays"), [("MISSED", ""), ("NONE", "it is rare")])
 def test_a_single_failure_stays_with_its_reason_or_is_cured(root, single, stays):
     rows = failures()
-    rows[0] = {**rows[0], "SINGLE": single, "STAYS": stays}
+    rows[0] = {**rows[0], "SINGLE": single, "STAYS": stays, "TOLD": stays and "NOBODY"}
     (told,) = problems([requirement(), *rows, *actions()], root)
     assert "STAYS says why a single failure stays" in told
+
+
+@pytest.mark.parametrize("told_to", [{}, {"TOLD": "FLIGHT, NOBODY"}, {"TOLD": "FLIGHT, GROUND"}])
+def test_of_what_stays_it_is_said_who_is_told(root, told_to):
+    rows = failures()
+    rows[0] = {**rows[0], "SINGLE": "MISSED", "STAYS": "One wire.", **told_to}
+    (told,) = problems([requirement(), *rows, *actions()], root)
+    assert "TOLD says who learns of what stays: NOBODY; FLIGHT; GROUND; GROUND, FLIGHT" in told
 
 
 def test_a_row_that_no_requirement_answers_is_told(root):
@@ -210,16 +218,38 @@ def test_a_row_that_no_requirement_answers_is_told(root):
 
 
 def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
+    """In four parts, and first what nobody is told of; a stranger's row stands last."""
     monkeypatch.setattr("safety_case.documents.FOLDER", tmp_path)
+    stays = {
+        (0, "late"): ("GROUND, FLIGHT", "It is slow."),
+        (0, "lost"): ("NOBODY", "One wire\nis one chance."),
+        (0, "forged"): ("NOBODY", "It has no signature."),
+        (5, "lost"): ("FLIGHT", "One trigger."),
+        (9, "wrong"): ("NOBODY", "All run it."),
+    }
     rows = failures()
-    rows[0] = {**rows[0], "SINGLE": "MISSED, FALSE", "STAYS": "One wire\nis one chance."}
+    for (part, mode), (told, why) in stays.items():
+        number = part * len(MODES) + list(MODES).index(mode)
+        rows[number] = {**rows[number], "SINGLE": "MISSED, FALSE", "TOLD": told, "STAYS": why}
     single_failures.write(rows)
     text = (tmp_path / "made_single_failures.sdoc").read_text()
-    assert f"1 of {len(rows)} failure modes stay." in text
-    assert "One wire is one chance." in text
-    assert "missed deploy" in text
-    assert "false deploy" in text
-    assert text.count("[LINK: ") == 1
+    assert f"5 of {len(rows)} failure modes stay." in text
+    read = [
+        "Nobody is told before it does harm",
+        "All run it.",  # it concerns all vehicles
+        "One wire is one chance.",
+        "An alarm in flight: land",
+        "One trigger.",
+        "and an alarm in flight",
+        "It is slow.",
+        "A stranger on a wire",
+        "It has no signature.",
+    ]
+    places = [text.index(one) for one in read]
+    assert places == sorted(places)
+    assert "in flight nothing tells" not in text, "a part that has no row is left out"
+    assert text.count("- missed deploy\n") == text.count("   false deploy\n") == 5
+    assert text.count("[LINK: ") == 5
     assert "in mavlink, both" in text
 
 
