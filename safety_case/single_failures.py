@@ -17,8 +17,8 @@ before it does harm, and comes first; in each table, what concerns more kinds of
 before what concerns fewer. What takes a stranger has a table of its own, as it has one answer:
 signing keys, SROS 2, and wires that stay inside the vehicle.
 
-IN: the vehicles of ``config/`` that have this part. The last column says why the failure stays, and
-what you must do.
+IN: the vehicles of ``config/`` that have this part. The last column says why the failure stays,
+and what you must do.
 """
 _LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
 _FORGED = "A stranger on a wire or on the network"

@@ -30,8 +30,8 @@ class ParachuteChanged:
 
 @dataclass(frozen=True)
 class VehicleChanged:
-    """Whoever knows the vehicle said something, or its silence grew too long. made: when the ages of
-    state were counted, monotonic s."""
+    """Whoever knows the vehicle said something, or its silence grew too long. made: when the ages
+    of state were counted, monotonic s."""
 
     state: VehicleState
     made: float
