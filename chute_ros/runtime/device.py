@@ -219,8 +219,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
             self.shell.publish(ParachuteTold(picture, event.received))
         elif isinstance(event, VehicleChanged):
             # It has waited for its turn: no part of it is as new as it was.
-            picture = VehicleReport(event.state.aged(now - event.made))
-            self.shell.publish(VehicleTold(picture, now))
+            vehicle = VehicleReport(event.state.aged(now - event.made))
+            self.shell.publish(VehicleTold(vehicle, now))
         elif isinstance(event, RequestReport):
             report = event.report
             self.desk.report(report.token, report.outcome, report.detail)
