@@ -26,6 +26,7 @@ from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
@@ -270,6 +271,19 @@ def test_from_startup_flight_is_blocked_just_when_the_time_of_the_slowest_link_i
     assert story.state.stage is Stage.BLOCKED
     assert "STARTUP -> BLOCKED: " in story.said()
     assert story.said().endswith(f"({'; '.join(story.newest(BLOCK).reasons)})")
+
+
+def test_a_rule_on_a_link_that_never_started_wakes_when_the_time_of_that_link_is_over() -> None:
+    """Given a vehicle that is READY while another parachute, which it may do without, starts."""
+    never = LinkCondition(UPF, (LinkJudgement.NEVER_SEEN,))
+    watch = rule(never, action=Action.NONE, states=(Stage.READY,))
+    limits = MappingProxyType({UPF: LinkLimits(startup_grace=20.0)})
+    links = {"required_links": (LINK,), "deploy_links": (LINK, UPF), "link_limits": limits}
+    config = with_rules(watch, **links)
+    state = replace(QUIET, stage=Stage.READY, stage_since=-60.0)
+    assert next_deadline(config, state, 12.0) == 20.0
+    assert never.find(config, state, 19.9).holds is False
+    assert never.find(config, state, 20.0).holds is True
 
 
 def test_it_stands_since_its_last_contradiction_and_stays_landed_while_it_is_armed() -> None:

@@ -49,9 +49,8 @@ class LinkCondition(Condition):
 
     def find(self, config: SupervisorConfig, state: State, now: float) -> Finding:
         """Each of its links as it is judged now; one that is still starting is none of them."""
-        names = config.required_links if self.link in (ANY, ALL) else (self.link,)
         looks, so = [], []
-        for name in names:
+        for name in self._links(config):
             evidence, limits = state.evidence(name), config.limits(name)
             judged = evidence.judged(limits, now)
             in_grace = now < state.started_at + limits.startup_grace
@@ -74,5 +73,9 @@ class LinkCondition(Condition):
     def deadlines(
         self, config: SupervisorConfig, state: State, holds: bool | None, doubts: bool, now: float
     ) -> Iterable[float]:
-        """None but those of every link's silence."""
-        return ()
+        """When its links should have started. Each link's own silence has deadlines anyhow."""
+        graces = (config.limits(name).startup_grace for name in self._links(config))
+        return [state.started_at + grace for grace in graces]
+
+    def _links(self, config: SupervisorConfig) -> tuple[str, ...]:
+        return config.required_links if self.link in (ANY, ALL) else (self.link,)
