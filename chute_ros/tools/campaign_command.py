@@ -149,8 +149,7 @@ def main() -> None:
         metavar="N",
         help="with --vehicle: fly each failure again with 1 to N faults around it",
     )
-    # `ros2 run` adds arguments for nodes, which this is none of.
-    chosen, _ = options.parse_known_args()
+    chosen = options.parse_args()
     profiles = config_folder() / "profiles"
     refuse_unfit(options, chosen)
     if chosen.vehicle is not None:

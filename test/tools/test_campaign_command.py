@@ -35,6 +35,7 @@ run = partial(call, campaign)
         (["--flights", "0"], "argument --flights: 0: need a whole number, 1 or more"),
         (["--flights", "-5"], "argument --flights: -5: need a whole number, 1 or more"),
         (["--flights", "nan"], "argument --flights: nan: need a whole number, 1 or more"),
+        (["--fligths", "5"], "unrecognized arguments: --fligths 5"),
         (["--each", "0"], "argument --each: 0: need a whole number, 1 or more"),
         (["--each", "1", "--resume", "/tmp/kept"], "argument --each: a campaign of each kind"),
         (["--jobs", "0"], "argument --jobs: 0: need a whole number, 1 or more"),
