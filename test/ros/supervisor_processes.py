@@ -91,10 +91,13 @@ class Pair:
         self.await_stage(SafetyState.READY)
         self.link.flying = True
         self.await_stage(SafetyState.IN_FLIGHT)
-        # What b has been told by a since, it knows.
-        heard = self.claims["b"][0]
-        self.bench.until(lambda: self.claims["b"][0] > heard + 0.3, "b has heard of it")
+        self.await_word_to("b")
         return self
+
+    def await_word_to(self, name):
+        """What the other one has published by now, this one knows."""
+        heard = self.claims[name][0]
+        self.bench.until(lambda: self.claims[name][0] > heard + 0.3, f"{name} has heard of it")
 
     def acted(self, action):
         return [(epoch, number) for epoch, number, one in self.link.acted if one is action]

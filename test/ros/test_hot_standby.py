@@ -34,6 +34,8 @@ def test_a_deploy_that_the_first_began_is_ended_by_the_second_without_a_second_s
     pair.link.outcomes = [Outcome.SENT]  # nothing is confirmed: the deploy stays under way
     answer = pair.bench.ask(Deploy, "safety/deploy", reason="it falls")
     pair.bench.until(lambda: pair.acted(Action.DEPLOY), "the deploy is sent")
+    # To both: a process that dies between two sends tells one of them.
+    pair.await_word_to("b")
     pair.send_signal("a", signal.SIGKILL)
     pair.await_leader("b")
     pair.bench.until(
