@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import CtrlC, at_ctrl_c
+from chute_ros.not_installed import remedy
 from chute_ros.plain_text import plain
 from chute_ros.ros.memory_limit import limit_memory
 from chute_ros.ros.middleware import set_up_middleware
@@ -23,14 +24,6 @@ _SWITCH_INTERVAL = 0.0002
 #: A node that is to end is gone after this at the latest, s (Fast DDS issue 6513: as it takes its
 #: participant down it may wait for a callback for ever).
 _ENDS_WITHIN = 10
-#: What no vehicle needs for its flight (requirements/extra.in).
-_EXTRA = ("nicegui",)
-_NOT_BUILT = (
-    "chute_msgs cannot be imported: build both packages and source the result:\n"
-    "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)\n"
-    "  colcon build                                           (in the repository's root)\n"
-    "  source install/setup.bash"
-)
 
 
 def run(name: str, place: str, actions: bool = False) -> None:
@@ -100,19 +93,8 @@ def _imported(module: str, class_name: str) -> Any:
     try:
         return getattr(importlib.import_module(module), class_name)
     except ImportError as error:
-        missing = getattr(error, "name", None) or ""
-        if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
-            sys.exit(f"{_NOT_BUILT}\n({error})")
-        if missing.partition(".")[0] in _EXTRA:
-            sys.exit(
-                f"{missing} is not installed: `pip install -r requirements/extra.in` brings it"
-            )
-        if missing:
-            sys.exit(
-                f"{missing} is not installed: `rosdep install --from-paths src "
-                "src/chute_ros/msg_defs --ignore-src` and "
-                "`pip install -r requirements/runtime.in` bring all that is needed"
-            )
+        if text := remedy(error):
+            sys.exit(text)
         raise
 
 

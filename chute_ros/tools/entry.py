@@ -25,7 +25,8 @@ _ALONE, _CUT_OFF_AFTER = ("chute",), 5.0
 
 def run(name: str, module: str) -> None:
     """Run main of the module of tool name; exit code 130 if Ctrl-C ended it, 141 if
-    who read its output has gone, 74 if that takes nothing for another reason."""
+    who read its output has gone, 74 if that takes nothing for another reason, 2 if something is
+    not installed or not built, or it does not tell a mistake of its user itself."""
     set_up_streams()
 
     def end(*_: object) -> None:
@@ -33,8 +34,12 @@ def run(name: str, module: str) -> None:
         os._exit(INTERRUPTED)
 
     with at_ctrl_c(end):
-        # Here: it takes up to a second.
-        main = importlib.import_module(f"chute_ros.tools.{module}").main
+        try:
+            # Here: it takes up to a second.
+            main = importlib.import_module(f"chute_ros.tools.{module}").main
+        except Exception as error:
+            _tell_mistake(name, error)
+            raise
     ctrl_c = CtrlC((_CUT_OFF_AFTER, end) if name in _ALONE else None)
     ctrl_c.install()
     try:
@@ -51,12 +56,29 @@ def run(name: str, module: str) -> None:
             sys.exit(_not_printed(name, error))
         # In the middle of a conversion rclpy's binding makes an error of its own of it.
         if not (ctrl_c.came or isinstance(error, KeyboardInterrupt) or _shut_down(error)):
+            _tell_mistake(name, error)
             raise
         _tell(name, "interrupted")
         sys.exit(INTERRUPTED)
     finally:
         # All is ended; a second Ctrl-C would only tell where in the interpreter it was.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _tell_mistake(name: str, error: BaseException) -> None:
+    """End in words where it is no mistake of ours."""
+    # Here: what is imported with this module comes before a Ctrl-C has its line.
+    from chute_ros.errors import ChuteError
+    from chute_ros.not_installed import remedy
+    from chute_ros.plain_text import plain
+
+    text = remedy(error) if isinstance(error, ImportError) else ""
+    if isinstance(error, ChuteError):
+        text = text or str(error)
+    if text:
+        for line in text.splitlines():
+            _tell(name, plain(line))
+        sys.exit(2)
 
 
 def _shut_down(error: BaseException) -> bool:

@@ -7,6 +7,7 @@ import os
 import sys
 
 from chute_ros.errors import ChuteError
+from chute_ros.not_installed import remedy
 from chute_ros.plain_text import plain
 from chute_ros.tools.chute.errors import CommandError, MistakeError
 from chute_ros.tools.chute.json_text import json_text
@@ -19,10 +20,6 @@ _PLACES = {
 }
 #: It tells that mistake among its findings.
 _DOCTOR = "doctor"
-_NOT_BUILT = (
-    "chute_msgs cannot be imported: build both packages (`make build`, or `colcon build`) and "
-    "source the result"
-)
 
 
 def main() -> None:
@@ -45,9 +42,7 @@ def _run(chosen: Chosen) -> int:
         module = importlib.import_module(f"chute_ros.tools.chute.{place}")
         return int(module.main(chosen))
     except ImportError as error:
-        missing = error.name or ""
-        text = _NOT_BUILT if missing.startswith("chute_msgs") else "a package is missing"
-        return _complain(chosen, CommandError(f"{text} ({error})"))
+        return _complain(chosen, CommandError(remedy(error) or str(error)))
     except ChuteError as error:
         return _complain(chosen, error)
 
