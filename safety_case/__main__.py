@@ -15,6 +15,8 @@ from safety_case import check, evidence, minimum_height, single_failures, supply
 from safety_case.documents import ROOT, Node, NotReadError, read, remove_made, strictdoc
 
 _OUT = ROOT / "case"
+#: What scripts/browser.sh is content with.
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def main() -> None:
@@ -59,7 +61,7 @@ def _make(nodes: list[Node]) -> None:
             "--formats=html,html2pdf",
             f"--output-dir={_OUT / 'work'}",
             f"--chromedriver={shutil.which('chromedriver')}",
-            f"--chrome-binary={shutil.which('chromium') or shutil.which('google-chrome')}",
+            f"--chrome-binary={next(filter(None, map(shutil.which, _BROWSERS)))}",
         )
         Path(_OUT / "work" / "html").rename(_OUT / "html")
         Path(_OUT / "work" / "html2pdf" / "pdf").rename(_OUT / "pdf")

@@ -23,6 +23,7 @@ export DEBIAN_FRONTEND=noninteractive
 if ! { apt-get update && apt-get install --yes --no-install-recommends "${packages[@]}"; } \
     >"$log" 2>&1; then
     tail -n 20 "$log" >&2
+    echo "chute_ros: Ubuntu's archive has no Chromium: install Google Chrome's package" >&2
     exit 1
 fi
 rm "$log"
