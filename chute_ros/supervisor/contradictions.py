@@ -10,7 +10,8 @@ contradict is denied, with the reason:
   for it: where motors shake it, it tells too little, and the estimator that flies on it sinks;
 - a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
   downwards by 9.8 - f at least);
-- a tilt, where it is carried in full and does not speed up.
+- a tilt, where it is carried in full and does not speed up, or in full as it leans and does not
+  sink.
 
 Only an origin that lives denies: a sensor that is stuck has no noise, one that fails has much of
 it.
@@ -310,9 +311,11 @@ def _fall_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
 def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     """Carried in full, and not sinking: it does not lie on its side. The vertical speed is of the
     estimator that tells the tilt, so that the barometer is asked first."""
-    known = _carried(motion)
-    if not any(one[3] < _LEANS for one in known):
+    if not motion or not any(one[3] < _LEANS for one in _last(motion, _CARRIED_FOR)):
         return ""
+    known = _carried(motion)
+    if not known:
+        return _carried_leaning(motion)
     force = fmean([one[2] for one in known])
     if barometer.rate >= -_LIES_AND_SINKS:
         told = f"the barometer tells {barometer.rate:+.1f} m/s"
@@ -322,16 +325,30 @@ def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"
 
 
-def _carried(motion: tuple[Moment, ...]) -> list[Moment]:
+def _carried_leaning(motion: tuple[Moment, ...]) -> str:
+    """It leans as far as one flies level with, and is carried as that takes."""
+    known = _carried(motion, leaning=True)
+    sped_up = known[-1][1] - known[0][1] if known else -math.inf
+    if sped_up < -_SPEEDS_UP or known[-1][1] < -_LIES_AND_SINKS:
+        return ""
+    force = fmean([one[2] for one in known])
+    return f"a force of {force:.1f} m/s^2 carries it as it leans, and it does not sink"
+
+
+def _carried(motion: tuple[Moment, ...], leaning: bool = False) -> list[Moment]:
     """The newest moments, if an accelerometer that lives tells in all of them that the vehicle is
-    carried in full; empty: it does not."""
+    carried in full; empty: it does not. leaning: by the part of the force that points upwards, as
+    far as it leans less than what lies on its side."""
     newest = _last(motion, _CARRIED_FOR) if motion else []
     known = [one for one in newest if not any(map(math.isnan, one))]
     if len(known) < _FEW or known[-1] is not motion[-1]:
         return []
-    forces, (least, most) = [one[2] for one in known], _CARRIED
+    if leaning and min(one[3] for one in known) < _ON_ITS_SIDE:
+        return []
+    felt, (least, most) = [one[2] for one in known], _CARRIED
+    lives = max(felt) - min(felt) >= _FORCE_LIVES
+    forces = [one[2] * one[3] for one in known] if leaning else felt
     in_full = all(abs(force - GRAVITY) <= _SHAKES for force in forces)
-    lives = max(forces) - min(forces) >= _FORCE_LIVES
     return known if in_full and lives and least <= fmean(forces) <= most else []
 
 

@@ -40,6 +40,9 @@ if TYPE_CHECKING:  # both hold rules, whose conditions are found here
 _CLIMB_OVER = 0.4
 #: Measurement -> the part of vehicle/state that tells it, where that has another name.
 PARTS = {"tilt_deg": "attitude"}
+#: A barometer that rises by so much faster than in the rest of the second, m/s, steps up: its
+#: noise is some decimetres in a tenth of a second.
+_STEP_UP = 10.0
 #: What a barometer told longer ago says nothing of a fall, s.
 _DROP_WITHIN = 12.0
 #: What an accelerometer tells of the last seconds.
@@ -109,8 +112,14 @@ def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
     if math.isnan(pressure_rate(config, state, now)):
         return NOT_TOLD
     heights = state.heard.pressure_heights
-    (since, before), (until, after) = heights[0], heights[-1]
-    return Rise((after - before) / (until - since), since, until)
+    since, until = heights[0][0], heights[-1][0]
+    usual = median(_rates(heights))
+    # As the propellers stop, a barometer in their wash tells some metres more within a moment.
+    risen = [
+        (usual if rate - usual > _STEP_UP else rate) * (after[0] - before[0])
+        for rate, (before, after) in zip(_rates(heights), pairwise(heights), strict=True)
+    ]
+    return Rise(sum(risen) / (until - since), since, until)
 
 
 def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
@@ -224,14 +233,16 @@ def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> 
 def _rate(heights: tuple[tuple[float, float], ...]) -> float:
     """What heights (monotonic s, m) tell of a climb, m/s."""
     # The middle one of the single rates: one step of a height, however high, is no climb.
-    rates = [
-        (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
-    ]
-    rate = median(rates)
+    rate = median(_rates(heights))
     # The noise of neighbours has a middle one as well; over the whole second it is small, where a
     # step is large. What both of them tell is flown.
     over = _slope(heights)
     return min(rate, over, key=abs) if rate * over > 0.0 else 0.0
+
+
+def _rates(heights: tuple[tuple[float, float], ...]) -> list[float]:
+    """From each to the next, m/s."""
+    return [(after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)]
 
 
 def _enough(heights: tuple[tuple[float, float], ...], newest: float) -> bool:

@@ -62,6 +62,20 @@ def test_a_silence_of_its_telemetry_hides_no_fall(begins: float) -> None:
     assert height > 50.0
 
 
+@pytest.mark.parametrize("says", [{"battery_remaining": 0.0}, {"system_status": 6}])
+@pytest.mark.parametrize("sinks", [6.5, 7.3])
+def test_who_comes_down_fast_with_an_empty_battery_is_not_ended(
+    says: dict[str, float], sinks: float
+) -> None:
+    """By hand, which tells no target; MAV_STATE_EMERGENCY is said by what still flies."""
+    story, height = aloft(), 90.0
+    while height > 15.0:
+        height -= 0.1 * sinks
+        told = {"height": height, "vertical_speed": -sinks, "acceleration": 9.8, **says}
+        story.fly(story.t + 0.1, every=0.1, **told)
+    assert story.fired() == []
+
+
 @pytest.mark.parametrize("sinks", [6.5, 7.3])
 @pytest.mark.parametrize("chopped", [0.45, 0.7, 0.9])
 def test_a_pilot_who_chops_the_throttle_and_sinks_on_is_not_ended(
