@@ -23,7 +23,7 @@ BY_COMMAND = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "E
 
 
 @dataclass(frozen=True)
-class Rig:
+class DemoRig:
     """One vehicle with its nodes. kind: one of KINDS; fault: one of FAULTS, or empty."""
 
     kind: str
@@ -35,7 +35,7 @@ class Rig:
     bus_port: int
 
     @classmethod
-    def on_free_ports(cls, kind: str, fault: str, namespace: str, processes: Processes) -> Rig:
+    def on_free_ports(cls, kind: str, fault: str, namespace: str, processes: Processes) -> DemoRig:
         """With wires that nobody else uses."""
         return cls(kind, fault, namespace, processes, *free_udp_ports(3))
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from chute_ros.plain_text import plain
 from chute_ros.ros import messages, qos
-from chute_ros.tools.chute.order import Answer
+from chute_ros.tools.chute.order import ServiceAnswer
 
 #: A process that ends after its order waits no longer for the record to take the answer, s.
 _LEFT_WITHIN = 0.5
@@ -57,7 +57,7 @@ class RecordedOrder:
         self._record, self.told = record, told
         self._called = time.monotonic()
 
-    def answered(self, answer: Answer) -> None:
+    def answered(self, answer: ServiceAnswer) -> None:
         """Its answer, published as well."""
         self.told.answered, self.told.success = True, answer.success
         self.told.accepted, self.told.message = bool(answer.accepted), answer.message

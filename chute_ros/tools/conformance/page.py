@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from chute_ros.conformance.clause import Packet, Result, Verdict
-from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.conformance.report import ConformanceReport
 from chute_ros.tools.report_parts import cell, document, number, section, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -24,7 +24,7 @@ _NO_CERTIFICATE = (
 )
 
 
-def page(report: Report) -> str:
+def page(report: ConformanceReport) -> str:
     """The whole page."""
     title = f"Conformance of {report.device}: {report.document}"
     problem = f'<p><b class="bad">{escaped(report.problem)}</b></p>\n' if report.problem else ""

@@ -12,7 +12,7 @@ from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Risk, Verdict
-from chute_ros.conformance.session import Allowed, Found, Session
+from chute_ros.conformance.session import Allowed, DeviceFound, Session
 from chute_ros.links.mavlink.conformance import CLAUSES
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench
 from chute_ros.links.mavlink.kit import KIT
@@ -294,4 +294,4 @@ def test_where_no_parachute_is_heard_it_tells_who_is() -> None:
     run = Run(device).to()
     assert run.problem.startswith("no parachute is received within 10 s (heard: 1/42)")
     assert run.results == {}
-    assert not any(isinstance(one, Found) for one in run.line.events)
+    assert not any(isinstance(one, DeviceFound) for one in run.line.events)

@@ -28,7 +28,7 @@ _CLOCK, _CLOCK_LEAST = 0.05, 0.1
 
 
 def _statuses(bench: MavlinkBench) -> Any:
-    """All (Heard) that came so far, or the first that comes."""
+    """All (ReceivedFrame) that came so far, or the first that comes."""
     if not any(one.kind == "PARACHUTE_STATUS" for one in bench.heard):
         yield from bench.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
     told = bench.look_at(one for one in bench.heard if one.kind == "PARACHUTE_STATUS")

@@ -14,9 +14,9 @@ from chute_ros.links.umbilical.conformance.bench import (
     EFFECT,
     LINE,
     TELEM,
-    HeardLine,
+    ReceivedLine,
+    ReceivedLines,
     UmbilicalBench,
-    Watch,
     mode_name,
 )
 from chute_ros.links.umbilical.conformance.document import (
@@ -43,12 +43,12 @@ _SEQUENCE = re.compile(r"seq=([0-9]{1,9})")
 
 
 def _worked(bench: UmbilicalBench, name: str, silence: float) -> Any:
-    """All that comes (Watch) from a command on, until telemetry goes on or this silence, s; no
-    lines: nothing came of it."""
+    """All that comes (ReceivedLines) from a command on, until telemetry goes on or this silence,
+    s; no lines: nothing came of it."""
     since, began = len(bench.heard), bench.now
     yield from bench.write(KINDS[name].command.token)
 
-    def lines() -> list[HeardLine]:
+    def lines() -> list[ReceivedLine]:
         return [one for one in bench.heard[since:] if one.kind in (LINE, DUMP)]
 
     def over() -> bool:
@@ -60,10 +60,10 @@ def _worked(bench: UmbilicalBench, name: str, silence: float) -> Any:
 
     yield Wait(bench.now + _BEGINS, lines)
     if not lines():
-        return Watch((), began, bench.now)
+        return ReceivedLines((), began, bench.now)
     while not over() and bench.now - bench.heard_at < silence and bench.now - began < _LONGEST:
         yield Wait(min(bench.heard_at + silence, bench.now + _OVER), over)
-    return Watch(bench.heard[since:], began, bench.now)
+    return ReceivedLines(bench.heard[since:], began, bench.now)
 
 
 def _dumped(bench: UmbilicalBench) -> Any:
@@ -73,7 +73,7 @@ def _dumped(bench: UmbilicalBench) -> Any:
     return bench.look_at(bench.kept["dumped"].lines)
 
 
-def _stored(lines: Sequence[HeardLine]) -> int:
+def _stored(lines: Sequence[ReceivedLine]) -> int:
     """Bytes that are neither telemetry nor log."""
     return sum(len(one.data) for one in lines if one.kind in (LINE, DUMP))
 
@@ -126,7 +126,7 @@ def _dump_fram(bench: UmbilicalBench) -> Trial:
 
 
 def _usage(bench: UmbilicalBench) -> Any:
-    """What comes of flash information: the line (HeardLine); None: nothing."""
+    """What comes of flash information: the line (ReceivedLine); None: nothing."""
     yield from bench.write(KINDS["flash_info"].command.token)
     return (yield from bench.wait_for(LINE, EFFECT))
 
@@ -173,7 +173,7 @@ def _wipe_flash(bench: UmbilicalBench) -> Trial:
     return str(line.packet.text)
 
 
-def _used(line: HeardLine | None) -> float:
+def _used(line: ReceivedLine | None) -> float:
     """KB of the flash in use by the answer to flash information; NaN: it does not say."""
     return line.said.used if line and isinstance(line.said, FlashUsage) else math.nan
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import HeardTransfer, UpfBench
+from chute_ros.links.upf.conformance.bench import TransferPacket, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -169,7 +169,7 @@ def _launches(bench: UpfBench, since: int) -> list[float]:
     return [one.at for one in bench.every[since:] if one.kind in kinds]
 
 
-def _tells_launched(bench: UpfBench, one: HeardTransfer) -> bool:
+def _tells_launched(bench: UpfBench, one: TransferPacket) -> bool:
     """Of the controller, that it is LAUNCHED."""
     if one.kind != names.PARACHUTE_STATUS or one.transfer.source != bench.node:
         return False

@@ -18,7 +18,7 @@ from chute_ros.conformance.clause import (
     not_supported,
     not_tried,
 )
-from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, UpfBench
+from chute_ros.links.upf.conformance.bench import NODE_STATUS, TransferPacket, UpfBench
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -53,7 +53,7 @@ def _mean(bench: UpfBench, kind: str) -> float:
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
-def _node_statuses(bench: UpfBench) -> list[HeardTransfer]:
+def _node_statuses(bench: UpfBench) -> list[TransferPacket]:
     """Of what was watched."""
     return [one for one in bench.watched if one.kind == NODE_STATUS]
 
@@ -64,7 +64,7 @@ def _longest_pause(bench: UpfBench, watched: float) -> float:
     return max(gaps, default=watched)
 
 
-def _begins_anew(statuses: Iterable[HeardTransfer]) -> bool:
+def _begins_anew(statuses: Iterable[TransferPacket]) -> bool:
     """The time since its start goes back in one of these NodeStatus."""
     uptimes = [one.values["uptime_sec"] for one in statuses]
     return any(later < earlier for earlier, later in pairwise(uptimes))

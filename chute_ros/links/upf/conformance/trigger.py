@@ -14,7 +14,7 @@ from chute_ros.links.upf.conformance import node_id, standard, wire
 from chute_ros.links.upf.conformance.bench import (
     STATUS_WITHIN,
     TRIGGER,
-    HeardTransfer,
+    TransferPacket,
     UpfBench,
 )
 from chute_ros.links.upf.conformance.flying import FIRES_WITHIN, MAY_FIRE
@@ -31,13 +31,13 @@ SHARED = (
 _EVERY = "every trigger on the bus"
 
 
-def _fired(bench: UpfBench, status: HeardTransfer) -> bool:
+def _fired(bench: UpfBench, status: TransferPacket) -> bool:
     """It tells that it has fired."""
     state = bench.definitions.state_name(status.kind, status.values)
     return bool(status.values.get("is_launched")) or state == "LAUNCHED"
 
 
-def _statuses(bench: UpfBench, since: int) -> list[HeardTransfer]:
+def _statuses(bench: UpfBench, since: int) -> list[TransferPacket]:
     """From this place of heard on."""
     return [one for one in bench.heard[since:] if one.kind == names.TRIGGER_STATUS]
 
@@ -67,7 +67,7 @@ def _can_fire(bench: UpfBench) -> Trial:
 def _fires(bench: UpfBench, since: int) -> Any:
     """The first status from this place of heard on that tells it; None: none does in time."""
 
-    def fits(one: HeardTransfer) -> bool:
+    def fits(one: TransferPacket) -> bool:
         return one.kind == names.TRIGGER_STATUS and _fired(bench, one)
 
     told = first_of(bench.heard, since, fits)
