@@ -176,7 +176,7 @@ class Session(Generic[BenchT]):
             verdict, why, proof = yield from self._tried(clause)
             restarted = self.bench.starts > starts and not clause.restarts
             if restarted and verdict is not Verdict.FAILED:
-                verdict, why = Verdict.FAILED, f"it started anew meanwhile ({why})"
+                verdict, why = Verdict.FAILED, f"it restarted meanwhile ({why})"
             starts = self.bench.starts
             shown = proof or self._judged(first)
             took = self.bench.now - began

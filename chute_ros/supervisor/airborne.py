@@ -30,7 +30,7 @@ def check_vehicle(turn: Turn) -> None:
         turn.move(StageEvent.TAKEN_OFF)
         _took_off(turn, anew=stage is not Stage.LANDED, armed=stage is Stage.ARMED)
     elif in_air and _falls_since_kill(turn):
-        turn.alarm("it falls since the kill, although it said that it stood")
+        turn.alarm("it falls since the kill, although it was reported to stand")
         turn.flight = replace(turn.flight, airborne=True, airborne_since=turn.now)
         turn.killing = replace(turn.killing, killed_in_flight=True)
     elif in_air is False and listed(stage, StageEvent.LANDED):

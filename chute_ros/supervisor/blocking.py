@@ -60,7 +60,7 @@ def check_links(turn: Turn) -> None:
             mute = [link for link in turn.config.deploy_links if turn.state.unmonitored(link)]
             if not heard and mute and turn.flight.armed_on_ground:
                 turn.move(
-                    StageEvent.ARMED, f"{', '.join(mute)} was armed, and cannot tell otherwise"
+                    StageEvent.ARMED, f"{', '.join(mute)} was armed, and cannot report otherwise"
                 )
             _show_armed(turn, heard)
         if not reasons and (text := not_seen(turn.config, turn.state)):

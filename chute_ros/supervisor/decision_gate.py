@@ -16,7 +16,7 @@ class DecisionVerdict(enum.Enum):
 
     ACT = "acts on it"
     NOT_ADDRESSED = "addressed to others"
-    SHADOW = "shadow: only said, not done"
+    SHADOW = "shadow: only reported, not done"
     REPEATED = "the same as one already acted on"
     OLDER = "older than one already seen"
     TOO_LATE = "came too late"

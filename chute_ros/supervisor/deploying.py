@@ -88,7 +88,7 @@ def _kill_again(turn: Turn, kill: Pending) -> None:
     was_off = turn.before.heard.vehicle.armed is Armed.DISARMED
     if was_off and kill.confirmed and armed_since(turn, kill):
         why = "the motors were armed again under a canopy that is out"
-        turn.alarm(f"{why}: they are stopped once more")
+        turn.alarm(f"{why}: they are stopped again")
         order_kill(turn, "armed under the canopy", (why,))
 
 
@@ -98,7 +98,7 @@ def _limit(turn: Turn, kill: Pending) -> str:
     low = release_due(config, turn.state, turn.now) < turn.deploying.deploy_due
     if kill.confirmed or not low:
         return f"limit {config.kill_to_deploy_delay:g} s"
-    told = f"{height.value:.1f} m told {turn.now - height.measured_at:.2f} s ago"
+    told = f"{height.value:.1f} m reported {turn.now - height.measured_at:.2f} s ago"
     limit = f"limit {config.low_kill_to_deploy_delay:g} s below {config.profile.low_height:g} m"
     return f"{limit}: {told}"
 

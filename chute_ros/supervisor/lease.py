@@ -29,8 +29,8 @@ class Role(enum.Enum):
 class LeaseEvent(enum.Enum):
     """What can happen to the lease."""
 
-    SILENCE = "no leader was heard for the lease's time"
-    HEARS_MORE = "the leader hears fewer links than this one"
+    SILENCE = "no leader's heartbeat was received for the lease's time"
+    HEARS_MORE = "the leader receives fewer links than this one"
     KNOWS_MORE = "the leader knows of no flight, and this one does"
     OUTRANKED = "another leads with the better claim"
     OVERSLEPT = "this one did not look for longer than the lease's time"
@@ -119,7 +119,7 @@ class Lease:
     looked_at: float = math.nan
     leader: str = ""
     leader_heard: float = math.nan
-    #: Since when the leader hears fewer links than this one.
+    #: Since when the leader receives fewer links than this one.
     hears_more_since: float = math.nan
     #: The highest epoch of any claim.
     highest: int = 0

@@ -27,7 +27,7 @@ PROPERTIES = {
     "kill_to_deploy_delay after it, or low_kill_to_deploy_delay where the vehicle may be low",
     "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
     "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
-    "since its autopilot started anew in flight",
+    "since its autopilot restarted in flight",
     "silence": "no rule deploys unless a sign of a fall came within the last second, or a kill "
     "was decided in flight, so high and so short a time ago that it is not down yet, or is "
     "confirmed: silence and lost links alone never do",

@@ -359,7 +359,7 @@ def unguarded():
     why = "no parachute can be reached: mavlink_parachute is LOST"
     return state(
         state_text=f"IN_FLIGHT, NOT GUARDED: {why}",
-        alarms=["rule 'link lost' warns: a device is not heard", why],
+        alarms=["rule 'link lost' warns: nothing is received from a device", why],
         rules=[WARNS],
         link_states=[3],
         devices_healthy=[False],
@@ -371,7 +371,7 @@ def test_a_vehicle_that_nobody_guards_says_so_in_its_first_line_and_is_not_well(
     assert text[0] == "IN_FLIGHT, NOT GUARDED"
     assert text[3:6] == [
         "  why                no parachute can be reached: mavlink_parachute is LOST",
-        "  ALARM              rule 'link lost' warns: a device is not heard",
+        "  ALARM              rule 'link lost' warns: nothing is received from a device",
         "  flight             not blocked",
     ]
     assert "  link lost: warns" in text

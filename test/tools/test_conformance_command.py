@@ -188,7 +188,7 @@ def test_where_nobody_reads_on_the_device_is_left_disarmed(tmp_path: Path) -> No
         kit.wait(60.0)
         assert kit.stderr is not None
         errors = kit.stderr.read()
-    assert (kit.returncode, errors) == (3, "conformance: nobody reads what it tells\n")
+    assert (kit.returncode, errors) == (3, "conformance: nobody reads what it reports\n")
     assert report.exists()
 
 

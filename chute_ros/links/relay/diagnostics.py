@@ -45,6 +45,6 @@ def link_task(
 
 def parachute_task(node: str, one: RelayDetails) -> DiagnosticStatus:
     """The parachute. It is never OK."""
-    text = "UNMONITORED: a relay output tells nothing of its parachute"
+    text = "UNMONITORED: a relay output reports nothing of its parachute"
     values = {"times fired": one.fired, "fired (s ago)": one.fired_ago}
     return diagnostics.status(node, "parachute", diagnostics.WARN, text, values, "")

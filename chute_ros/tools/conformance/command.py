@@ -49,7 +49,7 @@ from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
 #: What ends a process besides a Ctrl-C: somebody, or a terminal that is closed.
 _ENDS = {signal.SIGTERM: "SIGTERM", signal.SIGHUP: "the end of its terminal"}
-_UNREAD = "nobody reads what it tells"
+_UNREAD = "nobody reads what it reports"
 DONE, FAILED, MISTAKE, NOT_WHOLE = 0, 1, 2, 3
 #: After a Ctrl-C the device is disarmed, which takes this long at most, s.
 _ENDS_WITHIN = 40.0
@@ -111,7 +111,7 @@ def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.A
         "--soak",
         type=real("seconds", 1.0, 1e6),
         metavar="SECONDS",
-        help="look on for so long in the end",
+        help="watch the device for so long in the end",
     )
     options.add_argument("--html", type=Path, metavar="FILE", help="write the report for people")
     options.add_argument("--junit", type=Path, metavar="FILE", help="write it as JUnit")

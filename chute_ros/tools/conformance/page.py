@@ -19,7 +19,7 @@ _TONES = {
 #: recording (--mcap).
 _FIRST, _LAST = 20, 20
 _NO_CERTIFICATE = (
-    '<p class="dim">No certificate: it tells what this device did on this bench on this day, and '
+    '<p class="dim">No certificate: it shows what this device did on this bench on this day, and '
     "nothing of a canopy that opens.</p>\n"
 )
 

@@ -161,7 +161,7 @@ class _BagTranslator:
         """All of it; LogError: nothing of a vehicle."""
         remarks: list[str] = []
         if "armed" not in self._newest:
-            remarks.append("nothing tells when it was armed: taken to be armed throughout")
+            remarks.append("nothing reports when it was armed: taken to be armed throughout")
             beat = told.heartbeat(self._vehicle_type, self._autopilot, True)
             for at in self._out.seconds():
                 self._out.add_change(at, beat)
@@ -170,7 +170,7 @@ class _BagTranslator:
             wants = "vehicle/state, or mavros/global_position/rel_alt, altitude or local_position"
             types = ", ".join(sorted(self.unknown))
             lacking = f"; of these types it has no definition: {types}" if types else ""
-            raise LogError(f"{path}: no topic tells a height (need {wants}){lacking}")
+            raise LogError(f"{path}: no topic reports a height (need {wants}){lacking}")
         if self.unknown:
             remarks.append(f"without a definition: {', '.join(sorted(self.unknown))}")
         return FlightLog(

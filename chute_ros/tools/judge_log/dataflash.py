@@ -177,7 +177,7 @@ class _DataflashTranslator:
             for at, message in self._by_controller or self._by_ahr2:
                 self._out.add(at, message)
         if not self._arming:
-            remarks.append("nothing tells when it was armed: taken to be armed throughout")
+            remarks.append("nothing reports when it was armed: taken to be armed throughout")
         self._heartbeats(vehicle_type)
         self._landed_states()
         return FlightLog(

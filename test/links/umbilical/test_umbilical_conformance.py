@@ -370,5 +370,5 @@ def test_a_soak_of_a_device_that_starts_anew_fails() -> None:
     run.to(lambda: run.line.now > 115.0)
     device.act("reboot")
     run.to()
-    assert run.results["soak"].why == "without a command it started anew"
+    assert run.results["soak"].why == "without a command it restarted"
     assert not math.isnan(device.booted_at)

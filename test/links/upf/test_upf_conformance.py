@@ -365,7 +365,7 @@ def test_a_controller_is_not_taken_for_a_trigger() -> None:
     run.bus.nodes.remove(run.trigger)
     run.line.run()
     assert run.problem.startswith("no TriggerStatus is received")
-    assert f"nodes heard: {CONTROLLER_NODE_ID}" in run.problem
+    assert f"received from nodes: {CONTROLLER_NODE_ID}" in run.problem
     assert run.controller.requests_heard == []
 
 

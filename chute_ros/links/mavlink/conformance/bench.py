@@ -181,8 +181,8 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         if device is None:
             others = ", ".join(sorted({one.frame.device for one in self._every})) or "nobody"
             raise failed(
-                f"no parachute is received within {_FOUND_WITHIN:g} s (heard: {others}): check "
-                "the connection, and name the device with --component if it calls itself "
+                f"no parachute is received within {_FOUND_WITHIN:g} s (received from: {others}): "
+                "check the connection, and name the device with --component if it calls itself "
                 "something else"
             )
         self.system, self.component = device

@@ -102,7 +102,7 @@ def _release(bench: MavlinkBench) -> Trial:
     trigger = name_of(DeploymentTrigger, number)
     if number not in _US:
         raise failed(f"released by command, and its trigger is {trigger}", [status.packet])
-    return f"{trigger}, told after {status.at - began:.2f} s"
+    return f"{trigger}, reported after {status.at - began:.2f} s"
 
 
 def _stays(bench: MavlinkBench) -> Trial:

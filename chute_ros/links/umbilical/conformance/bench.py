@@ -356,7 +356,7 @@ class UmbilicalBench(RecordingBench[ReceivedLine]):
                 if None not in (was, now) and str(was) != str(now):
                     raise failed(f"{when} {name} went from {was} to {now}", [one.packet])
             if one.values.get(BOOT, math.inf) < before.values.get(BOOT, -math.inf):
-                raise failed(f"{when} it started anew", [one.packet])
+                raise failed(f"{when} it restarted", [one.packet])
 
     def restart(self) -> Trial:
         """Restart it; the text is empty if it does not begin anew."""

@@ -106,7 +106,9 @@ def _timeout(bench: UmbilicalBench) -> Trial:
     if not lost:
         if any(_connected(one) for one in bench.heard):
             raise failed(f"it counts as connected {_UNHEARD:g} s after the last <H>")
-        raise not_tried("no field of $TELEM and no line of its log tells whether it is connected")
+        raise not_tried(
+            "no field of $TELEM and no line of its log reports whether it is connected"
+        )
     after = lost[0].at - watch.began
     told = f"it counts as lost {after:.1f} s after the last <H>"
     if abs(after - _TIMEOUT) > _TYPICALLY:

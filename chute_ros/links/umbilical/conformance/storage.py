@@ -146,7 +146,7 @@ def _flash_info(bench: UmbilicalBench) -> Trial:
 def _restart(bench: UmbilicalBench) -> Trial:
     took = yield from bench.restart()
     if not took:
-        raise failed("<R>: it does not start anew")
+        raise failed("<R>: it does not restart")
     return (yield from _as_started(bench, took))
 
 
@@ -154,8 +154,8 @@ def _as_started(bench: UmbilicalBench, took: str) -> Trial:
     line = yield from bench.record()
     mode = line.values.get("flight_mode")
     if mode != FlightMode.STARTUP:
-        raise failed(f"it starts anew in {mode_name(mode)} (need Startup)", [line.packet])
-    return f"it starts anew after {took}, in Startup"
+        raise failed(f"it restarts in {mode_name(mode)} (need Startup)", [line.packet])
+    return f"it restarts after {took}, in Startup"
 
 
 def _wipe_flash(bench: UmbilicalBench) -> Trial:
@@ -167,7 +167,7 @@ def _wipe_flash(bench: UmbilicalBench) -> Trial:
     line = yield from _usage(bench)
     after = _used(line)
     if math.isnan(before) or math.isnan(after):
-        raise not_tried("it was sent, and <I> does not tell how much of the flash is used")
+        raise not_tried("it was sent, and <I> does not report how much of the flash is used")
     if after >= before > 0.0:
         raise failed(f"after <W> it says {line.packet.text}", [line.packet])
     return str(line.packet.text)
@@ -209,7 +209,7 @@ def _wipe_and_reboot(bench: UmbilicalBench) -> Trial:
     began = bench.now
     yield from bench.write(KINDS["wipe_fram_and_reboot"].command.token)
     if (yield from bench.started_anew(line.values.get(BOOT, 0))) is None:
-        raise failed("<X>: it does not start anew")
+        raise failed("<X>: it does not restart")
     told = yield from _as_started(bench, f"{bench.now - began:.1f} s")
     after = yield from _fram(bench)
     if _SEQUENCE.search(before) and not _is_reset(before, after):
@@ -219,7 +219,7 @@ def _wipe_and_reboot(bench: UmbilicalBench) -> Trial:
 
 _stores, _tells = of(STORAGE), of(TELEMETRY)
 CLAUSES: tuple[UmbilicalClause, ...] = (
-    _stores("flash-info", "<I> tells about the flash", _flash_info, ASKS),
+    _stores("flash-info", "<I> reports the flash", _flash_info, ASKS),
     _stores("dump-fram", "<f> dumps the FRAM", _dump_fram, _DUMPS),
     _stores("dump-flash", "<G> dumps the flash", _dump_flash, _DUMPS),
     _tells("dump-interrupts", "a dump of the flash interrupts $TELEM", _interrupts, _DUMPS),

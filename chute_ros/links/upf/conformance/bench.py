@@ -258,7 +258,7 @@ class UpfBench(RecordingBench[TransferPacket]):
             others = sorted({one.transfer.source for one in self.every})
             heard = ", ".join(map(str, others)) or "nobody"
             raise failed(
-                f"no {self.status} is received within {_FOUND_WITHIN:g} s (nodes heard: "
+                f"no {self.status} is received within {_FOUND_WITHIN:g} s (received from nodes: "
                 f"{heard}): check the bus and its bit rate, and the data types (--dsdl-path)"
             )
         self.heard = [one for one in self.every if one.transfer.source == self.node]

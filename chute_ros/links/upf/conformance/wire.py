@@ -67,7 +67,7 @@ def _spoilt(
     name = p.NODE_STATUS_INTERVAL
     before = yield from bench.value(name)
     if before is None:
-        raise not_tried(f"{name} is not told")
+        raise not_tried(f"{name} is not reported")
     bench.send_spoilt(name, _SPOILT, before, spoils)
     yield from bench.watch_on(ANSWER)
     after = yield from bench.value(name)
