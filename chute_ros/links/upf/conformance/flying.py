@@ -23,7 +23,6 @@ _TOLD_WITHIN, FIRES_WITHIN = 1.5, 4.0
 _WAITS = 3.0
 #: At rest for 5 s, and a while to tell.
 _RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
-_AUTOMATIC = (p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND)
 _UNKNOWN_TYPE = 200
 
 
@@ -76,7 +75,7 @@ def _excludes(type_name: str) -> UpfClause:
 
 def _by_hand(bench: UpfBench) -> Trial:
     """Nothing moves by itself, and it is READY."""
-    for name in _AUTOMATIC:
+    for name in p.AUTOMATIC:
         if (yield from bench.set(name, False)) is not False:
             raise failed(f"{name} cannot be switched off")
     for request in ("TYPE_DISARM", "TYPE_LAND"):
