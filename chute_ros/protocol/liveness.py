@@ -23,7 +23,7 @@ from chute_ros.transitions import after
 class LivenessEvent(enum.Enum):
     """What can happen to a link."""
 
-    HEARD = "heard"
+    HEARD = "received"
     STALE_LIMIT = "stale limit passed"
     LOST_LIMIT = "lost limit passed"
 

@@ -297,7 +297,7 @@ def _restart(bench: UpfBench) -> Trial:
         raise failed("RestartNode is not ok")
     yield from bench.reaches(ParachuteState.NOT_READY, 5.0)
     is_up = yield from bench.is_up(READY_WITHIN)
-    up = bench.device.up or "heard"
+    up = bench.device.up or "received"
     yield from bench.watch_on(0.5)
     yield Wait(bench.now + _LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
