@@ -137,7 +137,7 @@ def test_with_the_word_it_fires() -> None:
     code, out, errors = Bench().run("--fire", "--only", "release", typed="FIRE\n")
     assert (code, errors) == (0, "")
     assert "release: IT RELEASES" in out
-    assert "passed         release              DRONE, told after" in out
+    assert "passed         release              DRONE, reported after" in out
 
 
 @contextmanager

@@ -244,7 +244,7 @@ def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
     with Writer(tmp_path / "other", version=9) as writer:
         topic = writer.add_connection("/temperature", kind, typestore=store)
         writer.write(topic, 10**9, store.serialize_cdr(store.types[kind](21.0), kind))
-    with pytest.raises(LogError, match="no topic tells a height"):
+    with pytest.raises(LogError, match="no topic reports a height"):
         formats.read(tmp_path / "other", {})
 
 
