@@ -156,7 +156,7 @@ build: ## build both packages
 lint: ## ruff, mypy and the import rule
 	@$(UNDERLAY) && exec scripts/lint.sh
 
-docs: build ## write the tables of docs/reference/, config/ and docs/reference/states.* anew
+docs: build ## write the tables of docs/reference/, config/ and docs/reference/states.* again
 	@$(OVERLAY) && export PYTHONPATH="$$PWD:$$PYTHONPATH" \
 	    && python3 -m chute_ros.tools.parameter_docs && python3 -m chute_ros.tools.state_diagram
 

@@ -6,7 +6,7 @@ import itertools
 
 from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 
 #: What the flight computer sends, lines a second.
 REAL_RATE = 13.0
@@ -49,7 +49,7 @@ def fly(layout: Layout) -> list[str]:
             data += chunk
         if commands and now >= commands[0][0]:
             computer.receive(commands.pop(0)[1], now)
-        down = computer.mode == Mode.MainDeployed and computer.flight.rocket.on_ground
+        down = computer.mode == ComputerMode.MainDeployed and computer.flight.rocket.on_ground
         landed = landed or (now if down else 0.0)
         now = max(computer.next_deadline(), now + 1e-6)
     return [line.removeprefix("$TELEM,") for line in data.decode().splitlines()]

@@ -14,7 +14,7 @@ from bench.flood import Flood
 from chute_ros.errors import ChuteError
 from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, VEHICLE_SERVICE, Definitions
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.transport.address import parse_address
@@ -159,7 +159,7 @@ class WireEnds:
                 at = time.perf_counter_ns()
                 for data, _ in packets:
                     heard = self._endpoint.receive(data, now)
-                    if heard is None or heard.kind is not Kind.RESPONSE:
+                    if heard is None or heard.kind is not TransferKind.RESPONSE:
                         continue
                     if (heard.name, heard.transfer_id) == (VEHICLE_SERVICE, self._transfer_id):
                         result = self._definitions.result_name(VEHICLE_SERVICE, heard.values)

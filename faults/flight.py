@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import Director
-from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.demo_rig import DemoRig
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
 from faults.network import Network
@@ -31,7 +31,7 @@ class Flight:
         self.namespace = namespace
         self.processes = processes or Processes(folder)
         self.director = Director(namespace, self.processes)
-        self.rig = Rig.on_free_ports("mavlink", "", namespace, self.processes)
+        self.rig = DemoRig.on_free_ports("mavlink", "", namespace, self.processes)
         self.pilot = Pilot(self.rig.pilot, system_id=1)
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from chute_ros.links.upf.protocol.definitions import (
 )
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.transport.can_address import CanAddress
 from chute_ros.transport.can_multicast import CanMulticastWire
 from chute_ros.transport.data_types import load_data_types
@@ -74,7 +74,7 @@ class CanRelay(Relay):
                 continue
             if heard.name == TRIGGER_LAUNCH and node_id == TRIGGER_NODE_ID:
                 self.seen(self.name, DEPLOY, heard.name)
-            if heard.kind is not Kind.REQUEST:
+            if heard.kind is not TransferKind.REQUEST:
                 continue
             # TYPE_DEPLOY and TYPE_DEPLOY_FORCE; a trigger is asked for nothing else.
             asks = heard.name == PARACHUTE_SERVICE and heard.values.get("type") in (5, 6)

@@ -15,8 +15,8 @@ from chute_msgs.srv import Arm, Deploy
 from std_srvs.srv import Trigger
 
 from chute_ros.links.registered import module_of
+from chute_ros.links.upf.protocol.parameters import AUTOMATIC
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.demo_rig import BY_COMMAND
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import ros_arguments
 from faults.network import Network
@@ -215,7 +215,7 @@ class Vehicle(Patient):
                 *("--connection", ports.device_bus, "--vehicle", feel),
                 *[
                     part
-                    for name in ("Enable APS", *BY_COMMAND)
+                    for name in ("Enable APS", *AUTOMATIC)
                     for part in ("--parameter", f"{name}=false")
                 ],
             ),

@@ -34,7 +34,7 @@ from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
 from chute_ros.tools.launch_checks import (
     FAILURES,
-    Flight,
+    FlightArguments,
     check_arguments,
     check_port,
     checked,
@@ -87,7 +87,7 @@ def _vehicle(context: LaunchContext) -> list:
 
 def _flight(context: LaunchContext, vehicle: str) -> dict:
     """What its simulators are told to do: each one's options."""
-    flight = Flight(
+    flight = FlightArguments(
         fly=LaunchConfiguration("fly").perform(context),
         launch=LaunchConfiguration("launch").perform(context),
         fail=LaunchConfiguration("fail").perform(context),

@@ -137,7 +137,7 @@ _SIGNS = (
     (
         ("DO NOT MATCH THE HASHES", "Hash mismatch", "hash mismatch", "hashes must match"),
         "a package is not the one that was locked (its hash differs)",
-        "try once more; if it stays so, your package index or proxy serves altered files",
+        "try again; if it stays so, your package index or proxy serves altered files",
     ),
     (
         ("CERTIFICATE_VERIFY_FAILED", "invalid peer certificate"),

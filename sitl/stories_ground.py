@@ -172,6 +172,6 @@ STORIES = (
         (PX4,),
         spoils=True,
     ),
-    Story("restart-ground", "the autopilot starts anew on the ground", _restarts_on_the_ground,
+    Story("restart-ground", "the autopilot restarts on the ground", _restarts_on_the_ground,
           spoils=True, restarts=True),
 )  # fmt: skip

@@ -1,8 +1,10 @@
-"""The rule that the pure packages stay pure holds, and it bites."""
+"""Rules of the source code hold, and they bite: what the pure packages import, what reads files,
+that a class name occurs once."""
 
 import ast
 import shutil
 import subprocess
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -119,3 +121,30 @@ def test_what_a_person_names_is_read_by_regular_file_alone():
 )
 def test_and_finds_one_that_reads_by_itself(line):
     assert bare_reads(f"text = {line}") == [1]
+
+
+def repeated(folder):
+    """Class name -> where it stands, of those that stand in several places; a private name may
+    stand once in each package."""
+    places = defaultdict(list)
+    for path in sorted(folder.rglob("*.py")):
+        for one in ast.parse(path.read_text()).body:
+            if isinstance(one, ast.ClassDef):
+                package = str(path.parent) if one.name.startswith("_") else ""
+                place = f"{path.relative_to(folder)}:{one.lineno}"
+                places[package, one.name].append(place)
+    return {name: found for (_, name), found in places.items() if len(found) > 1}
+
+
+def test_a_class_name_occurs_once():
+    assert repeated(ROOT / "chute_ros") == {}
+
+
+def test_and_one_that_occurs_again_is_named_with_both_places(tmp_path):
+    (tmp_path / "protocol").mkdir()
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "protocol" / "a.py").write_text("class Report: ...\nclass _Kept: ...\n")
+    (tmp_path / "tools" / "b.py").write_text("class _Kept: ...\n\n\nclass Report: ...\n")
+    assert repeated(tmp_path) == {"Report": ["protocol/a.py:1", "tools/b.py:4"]}
+    (tmp_path / "tools" / "c.py").write_text("class _Kept: ...\n")
+    assert repeated(tmp_path)["_Kept"] == ["tools/b.py:1", "tools/c.py:1"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from chute_ros.supervisor import lease
-from chute_ros.supervisor.machine import TRANSITIONS, Event, Stage
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, StageEvent
 from chute_ros.tools import state_diagram
 from chute_ros.tools.state_drawing import drawing
 
@@ -14,7 +14,7 @@ Transition = tuple[tuple[enum.Enum, enum.Enum], enum.Enum]
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def unreached(transitions: Mapping[tuple[Stage, Event], Stage]) -> set[Stage]:
+def unreached(transitions: Mapping[tuple[Stage, StageEvent], Stage]) -> set[Stage]:
     """The stages to which nothing leads from STARTUP."""
     reached, new = {Stage.STARTUP}, {Stage.STARTUP}
     while new:
@@ -23,7 +23,7 @@ def unreached(transitions: Mapping[tuple[Stage, Event], Stage]) -> set[Stage]:
     return set(Stage) - reached
 
 
-def never_left(transitions: Mapping[tuple[Stage, Event], Stage]) -> set[Stage]:
+def never_left(transitions: Mapping[tuple[Stage, StageEvent], Stage]) -> set[Stage]:
     """The stages from which nothing leads to another."""
     return set(Stage) - {before for (before, _), after in transitions.items() if after != before}
 
@@ -50,10 +50,10 @@ def told(text: str, events: type[enum.Enum], states: type[enum.Enum]) -> list[Tr
 
 def test_the_text_has_every_transition_once() -> None:
     of_vehicle, of_lease = state_diagram.states_text().split("## Which of several")
-    vehicle = told(of_vehicle, Event, Stage)
+    vehicle = told(of_vehicle, StageEvent, Stage)
     assert len(vehicle) == len(TRANSITIONS)
     assert dict(vehicle) == TRANSITIONS
-    leading = told(of_lease, lease.Event, lease.Role)
+    leading = told(of_lease, lease.LeaseEvent, lease.Role)
     assert len(leading) == len(lease.TRANSITIONS)
     assert dict(leading) == lease.TRANSITIONS
     arrows = state_diagram.states_text().count("-->")
@@ -74,7 +74,7 @@ def test_a_dead_end_and_a_lost_stage_are_found() -> None:
     assert unreached(into) == {Stage.LANDED}
     out = {pair: after for pair, after in TRANSITIONS.items() if pair[0] is not Stage.KILLING}
     assert never_left(out) == {Stage.KILLING}
-    itself = {**out, (Stage.KILLING, Event.KILL): Stage.KILLING}
+    itself = {**out, (Stage.KILLING, StageEvent.KILL): Stage.KILLING}
     assert never_left(itself) == {Stage.KILLING}
 
 
@@ -84,4 +84,4 @@ def test_the_picture_has_every_stage_and_every_event() -> None:
     for stage in Stage:
         assert stage.name in texts
     told = " ".join(texts)
-    assert [one.name for one in Event if one.name not in told] == []
+    assert [one.name for one in StageEvent if one.name not in told] == []

@@ -15,7 +15,7 @@ from chute_ros.campaign.scenario import Failure, Fault, HomeMove, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.taped import RealSensors, TapedAutopilot, TapedModel, truth_of
 from chute_ros.campaign.truth import SOFT, Truth, observe
-from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
+from chute_ros.campaign.vehicle import CampaignAutopilot, Physics, WindyModel
 from chute_ros.model import Action
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import KINDS, AutopilotKind
@@ -87,8 +87,8 @@ class Aircraft(Rig):
         plug = Plug(self.network, "autopilot", self.autopilot, is_for_devices)
         self.add_device(plug, self.autopilot.reboot)
         self.join_links()
-        self.nature = Nature(self.model, scenario.ground, self._moved)
-        self.world.add(self.nature)
+        self.physics = Physics(self.model, scenario.ground, self._moved)
+        self.world.add(self.physics)
         for source in scenario.second_sources:
             self.add_source(source, self.model)
         #: From its arming until it leaves the ground, s.
@@ -112,10 +112,10 @@ class Aircraft(Rig):
 
     def _leave(self, now: float) -> None:
         self.autopilot.act(f"takeoff={self.scenario.height}")
-        self.nature.lifts = self._left = True
+        self.physics.lifts = self._left = True
 
     def is_up(self) -> bool:
-        return self._left and (self._flew or self.scenario.stands) and not self.nature.lifts
+        return self._left and (self._flew or self.scenario.stands) and not self.physics.lifts
 
     def plan(self, up: float) -> None:
         super().plan(up)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from chute_ros.campaign.channel import Channel, Nature, Way
+from chute_ros.campaign.channel import Channel, Delivery, Way
 from chute_ros.campaign.world import World
 from chute_ros.sim.faults import flip_a_byte
 from chute_ros.transport.loop import ProtocolLink
@@ -37,15 +37,15 @@ Spoil = Callable[[bytes, random.Random], bytes | None]
 class Medium:
     """What it is made of."""
 
-    nature: Nature
+    delivery: Delivery
     spoil: Spoil
 
 
 #: Half of the way from one to another each: datagrams on a companion computer's network, frames on
 #: a CAN bus, USB packets of a serial cable.
-MAVLINK = Medium(Nature(0.00025, overtaken=0.05), flip_a_byte)
-CAN = Medium(Nature(0.0001, overtaken=0.002), refuse_can)
-SERIAL = Medium(Nature(0.001, in_order=True), flip_a_byte)
+MAVLINK = Medium(Delivery(0.00025, overtaken=0.05), flip_a_byte)
+CAN = Medium(Delivery(0.0001, overtaken=0.002), refuse_can)
+SERIAL = Medium(Delivery(0.001, in_order=True), flip_a_byte)
 
 
 class Plug:
@@ -126,7 +126,7 @@ class Bus:
     def _channel(self, plug: Plug, which: str, spoil: Spoil | None) -> Channel[bytes]:
         seed, medium = f"{self._seed} {plug.name} {which}", self._medium
         ways = (plug.way,)
-        return Channel(self.world, seed, medium.nature, ways, spoil or medium.spoil)
+        return Channel(self.world, seed, medium.delivery, ways, spoil or medium.spoil)
 
     def carry(self, source: Plug, frames: Sequence[bytes], now: float) -> None:
         """What source said has got to the bus: take it to everybody else."""

@@ -13,14 +13,14 @@ from pathlib import Path
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flown, fly
-from chute_ros.campaign.judge import WRONG, Count, Judged, judge
+from chute_ros.campaign.judge import WRONG, Count, JudgedFlight, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.tapes import TapeFile
 
 
 @dataclass(frozen=True)
-class Line:
+class FlightSummary:
     """One flight in a few numbers. NaN: it was not."""
 
     seed: int
@@ -54,8 +54,8 @@ class Tally:
     powerless: Counter[tuple[str, Count]] = field(default_factory=Counter)
     #: Of flights on tapes: (body and its failure, other faults were drawn, count) -> flights.
     by_body: Counter[tuple[str, bool, Count]] = field(default_factory=Counter)
-    wrong: list[Line] = field(default_factory=list)
-    lines: list[Line] = field(default_factory=list)
+    wrong: list[FlightSummary] = field(default_factory=list)
+    lines: list[FlightSummary] = field(default_factory=list)
     #: s, of all that flew at the same time.
     took: float = 0.0
 
@@ -64,7 +64,7 @@ class Tally:
         """Flights."""
         return self.flights / self.took * 60.0
 
-    def add(self, line: Line) -> None:
+    def add(self, line: FlightSummary) -> None:
         """One more."""
         self.flights += 1
         self.counts[line.count] += 1
@@ -94,19 +94,21 @@ def drawn(folder: Path, seed: int, tapes: TapeFile | None = None) -> Scenario:
 
 def fly_here(
     folder: Path, scenario: Scenario, tapes: TapeFile | None = None
-) -> tuple[Flown, Judged]:
+) -> tuple[Flown, JudgedFlight]:
     """One flight, and what it is counted as."""
     flown = fly(scenario, shipped(folder, tapes))
     return flown, judge(flown)
 
 
-def fly_bundle(folder: Path, seeds: Sequence[int], tapes: TapeFile | None = None) -> list[Line]:
+def fly_bundle(
+    folder: Path, seeds: Sequence[int], tapes: TapeFile | None = None
+) -> list[FlightSummary]:
     """One flight for each seed, in this process. folder: of the profiles; tapes: bodies that some
     of them fly."""
     return [_line(folder, seed, tapes) for seed in seeds]
 
 
-def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
+def _line(folder: Path, seed: int, tapes: TapeFile | None) -> FlightSummary:
     scenario = drawn(folder, seed, tapes)
     faults = tuple(type(one).__name__ for one in scenario.faults)
     taped = scenario.tape
@@ -118,9 +120,9 @@ def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
         flown, judged = fly_here(folder, scenario, tapes)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
-        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *more)
+        return FlightSummary(*who, Count.BROKEN, why, math.nan, math.nan, *more)
     at = flown.truth.at
-    return Line(
+    return FlightSummary(
         *who,
         judged.count,
         judged.why,
@@ -131,7 +133,7 @@ def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
 
 
 def run(
-    flown: Generator[Line, None, None], progress: Callable[[Tally], None], tally: Tally
+    flown: Generator[FlightSummary, None, None], progress: Callable[[Tally], None], tally: Tally
 ) -> Tally:
     """Flights in the order of their seeds, added to tally as they come.
 

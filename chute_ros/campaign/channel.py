@@ -44,8 +44,8 @@ Way = list[Spell]
 
 
 @dataclass(frozen=True)
-class Nature:
-    """What kind of way it is. delay: s; in_order: what comes later never overtakes what went
+class Delivery:
+    """How messages arrive. delay: s; in_order: what comes later never overtakes what went
     before, as with one writer of ROS; overtaken: one that is comes at most so much later, s."""
 
     delay: float
@@ -61,11 +61,11 @@ class Channel(Generic[MessageT]):
         self,
         world: World,
         seed: str,
-        nature: Nature,
+        delivery: Delivery,
         ways: tuple[Way, ...],
         spoil: Callable[[MessageT, random.Random], MessageT | None] | None = None,
     ) -> None:
-        self._world, self._seed, self._nature = world, seed, nature
+        self._world, self._seed, self._delivery = world, seed, delivery
         self._ways, self._spoil = ways, spoil
         self._newest = 0.0
 
@@ -83,7 +83,7 @@ class Channel(Generic[MessageT]):
         now = self._world.now
         spells = [spell for way in self._ways for spell in way if spell.is_on(now)]
         if not spells:
-            self._post(now + self._nature.delay, messages, deliver)
+            self._post(now + self._delivery.delay, messages, deliver)
             return
         for message in messages:
             self._send_one(message, spells, deliver)
@@ -94,8 +94,8 @@ class Channel(Generic[MessageT]):
         spells: list[Spell],
         deliver: Callable[[Sequence[MessageT], float], None],
     ) -> None:
-        chance, nature = self._chance.random, self._nature
-        copies, arrives = 1, self._world.now + nature.delay
+        chance, delivery = self._chance.random, self._delivery
+        copies, arrives = 1, self._world.now + delivery.delay
         for spell in spells:
             if spell.loss and chance() < spell.loss:
                 return
@@ -109,7 +109,7 @@ class Channel(Generic[MessageT]):
             if spell.delay:
                 arrives += chance() * spell.delay
             if spell.reorder and chance() < spell.reorder:
-                arrives += chance() * nature.overtaken
+                arrives += chance() * delivery.overtaken
         for _ in range(copies):
             self._post(arrives, (message,), deliver)
 
@@ -119,6 +119,6 @@ class Channel(Generic[MessageT]):
         messages: Sequence[MessageT],
         deliver: Callable[[Sequence[MessageT], float], None],
     ) -> None:
-        if self._nature.in_order:
+        if self._delivery.in_order:
             arrives = self._newest = max(arrives, self._newest)
         self._world.post(arrives, partial(deliver, messages))

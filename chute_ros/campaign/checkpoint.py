@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import chute_ros
-from chute_ros.campaign.campaign import Line, Tally
+from chute_ros.campaign.campaign import FlightSummary, Tally
 from chute_ros.campaign.judge import Count
 from chute_ros.errors import RecordError
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -119,10 +119,12 @@ def tally_of(text: str, seed: int, code: str, named: str) -> Tally:
         raise RecordError(f"{named} is no kept campaign: {kind}: {error}") from None
 
 
-def _written(line: Line) -> list[Any]:
+def _written(line: FlightSummary) -> list[Any]:
     return [one.name if isinstance(one, Count) else one for one in astuple(line)]
 
 
-def _read(values: list[Any]) -> Line:
-    told = dict(zip((one.name for one in fields(Line)), values, strict=True))
-    return Line(**{**told, "count": Count[told["count"]], "faults": tuple(told["faults"])})
+def _read(values: list[Any]) -> FlightSummary:
+    told = dict(zip((one.name for one in fields(FlightSummary)), values, strict=True))
+    return FlightSummary(
+        **{**told, "count": Count[told["count"]], "faults": tuple(told["faults"])}
+    )

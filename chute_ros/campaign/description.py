@@ -35,7 +35,7 @@ _SOFT = 1.25
 
 
 @dataclass(frozen=True)
-class Field:
+class DescribedNumber:
     """A number of the description. default: in words; empty: needed. spread: it may be [least,
     most]."""
 
@@ -54,28 +54,32 @@ class Field:
 
 
 NUMBERS = {
-    "mass": Field("mass at the take-off", "kg", 0.1, 1000.0),
-    "drag_area": Field(
+    "mass": DescribedNumber("mass at the take-off", "kg", 0.1, 1000.0),
+    "drag_area": DescribedNumber(
         "drag coefficient times area of the vehicle as it falls; with the mass it gives the speed "
         "of the fall",
         *("m^2", 0.001, 50.0),
         spread=True,
     ),
-    "descent_rate": Field("sink under the open canopy with this mass", "m/s", 1.0, 12.0),
-    "opening_time": Field("from the release to the open canopy", "s", 0.05, 10.0, "", spread=True),
-    "soft_landing": Field(
+    "descent_rate": DescribedNumber("sink under the open canopy with this mass", "m/s", 1.0, 12.0),
+    "opening_time": DescribedNumber(
+        "from the release to the open canopy", "s", 0.05, 10.0, "", spread=True
+    ),
+    "soft_landing": DescribedNumber(
         f"the fastest touchdown that counts as soft; at least {_SOFTER:g} of `descent_rate`",
         *("m/s", 1.0, 15.0),
         f"{_SOFT:g} of `descent_rate`",
     ),
-    "heights": Field("heights above the ground that it flies at", "m", 5.0, 300.0, "", True),
-    "descent_speed": Field(
+    "heights": DescribedNumber(
+        "heights above the ground that it flies at", "m", 5.0, 300.0, "", True
+    ),
+    "descent_speed": DescribedNumber(
         "the fastest descent that is commanded; each failure is flown in it as well as in level "
         "flight",
         *("m/s", 0.5, 10.0),
         "level flight alone",
     ),
-    "wind": Field("the strongest wind that it flies in", "m/s", 0.0, 20.0, "8"),
+    "wind": DescribedNumber("the strongest wind that it flies in", "m/s", 0.0, 20.0, "8"),
 }
 
 
@@ -122,7 +126,7 @@ CHOICES = {
         "as the campaign draws",
     ),
 }
-FIELDS: dict[str, Choice | Field] = {**CHOICES, **NUMBERS}
+FIELDS: dict[str, Choice | DescribedNumber] = {**CHOICES, **NUMBERS}
 
 
 def parachutes() -> tuple[str, ...]:
@@ -181,7 +185,7 @@ class _Description(ProfileLines):
     def _kind(self, entries: dict[str, Where]) -> str:
         return self.choice(entries["kind"], "kind", KINDS) if "kind" in entries else KINDS[0]
 
-    def _number(self, where: Where, key: str, field: Field) -> float | Range:
+    def _number(self, where: Where, key: str, field: DescribedNumber) -> float | Range:
         what = f"{key} ({field.unit})"
         if not field.spread:
             return self.number(where, what, field.least, field.most)

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.lies import Estimate
 
 #: One that diverged is led back to its barometer within this, s.
 _LED_BACK = 3.0
@@ -37,14 +38,6 @@ class EstimatorFault:
         return replace(self, begin=self.begin + by, end=self.end + by)
 
 
-class Picture(NamedTuple):
-    """m above take-off, m/s up, rad."""
-
-    height: float
-    vertical_speed: float
-    roll: float
-
-
 class Estimator:
     """What it makes of the vehicle, before the noise of its sensors."""
 
@@ -57,7 +50,7 @@ class Estimator:
         """It is wrong enough for its autopilot to take the vehicle for one in the air."""
         return any(one.begin <= now < one.end for one in self.faults)
 
-    def picture(self, model: FlightModel, now: float) -> Picture:
+    def picture(self, model: FlightModel, now: float) -> Estimate:
         """By now."""
         height, speed, roll = model.height, model.vertical_speed, model.roll
         for fault in self.faults:
@@ -72,7 +65,7 @@ class Estimator:
                 height, speed, roll = height - too_low, speed - too_slow, roll + lean
             elif now < fault.end:
                 height, speed = self._kept.setdefault(fault, height), 0.0
-        return Picture(height, speed, roll)
+        return Estimate(height, speed, roll)
 
 
 def _diverged(error: float, passed: float, lasts: float) -> tuple[float, float]:

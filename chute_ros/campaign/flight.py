@@ -68,7 +68,7 @@ def _end_of(fault: Fault) -> float:
     return fault.at if isinstance(fault, (ClockJump, HomeMove)) else fault.end
 
 
-class Call:
+class PersonCall:
     """One wish of a person at the services of the supervisor that leads, called again where there
     is no answer, or where another leads. make: the input of the core with a token."""
 
@@ -112,8 +112,8 @@ class Flight:
     ) -> None:
         self.scenario = scenario
         self.rig = _rig(scenario, shipped, make_peer)
-        self._arming: Call | None = None
-        self._person = Call(self.rig, self._wish)
+        self._arming: PersonCall | None = None
+        self._person = PersonCall(self.rig, self._wish)
         self.up = self._took_off = math.nan
         self.rig.world.post(_FIRST_LOOK, self._look)
 
@@ -165,7 +165,7 @@ class Flight:
         if not self.scenario.arms:
             return True
         if self._arming is None:
-            self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
+            self._arming = PersonCall(self.rig, lambda token: i.ArmRequest(token, True, 0))
             self._arming.begin(now)
         answer = self._arming.answer
         if answer is not None and not answer.success:

@@ -49,7 +49,7 @@ class Campaign:
 
 
 @dataclass(frozen=True)
-class Found:
+class CaseFlights:
     """All flights of a case, in the order of their seeds."""
 
     case: Case
@@ -91,13 +91,16 @@ class Found:
         return [one.lowest for one in self.every if one.counts and one.lowest is not None]
 
 
-def find(campaign: Campaign, jobs: int, at: Callable[[int], None]) -> list[Found]:
+def find(campaign: Campaign, jobs: int, at: Callable[[int], None]) -> list[CaseFlights]:
     """Fly all, in so many processes. at: told how many seeds have been flown. CampaignError: a
     process ended by itself, or a flight never took off."""
     shared = own_shipped(campaign.folder, campaign.vehicle.profile)
     flown = flown_here(partial(fly, campaign), shared, range(campaign.number), jobs)
     with closing(flown):
-        return [Found(one, _taken(flown, campaign, at, n)) for n, one in enumerate(campaign.cases)]
+        return [
+            CaseFlights(one, _taken(flown, campaign, at, n))
+            for n, one in enumerate(campaign.cases)
+        ]
 
 
 def _taken(

@@ -42,21 +42,21 @@ WRONG = tuple(one for one in Count if one not in (Count.CORRECT, Count.NO_TIME, 
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedFlight:
     """count, and in words why."""
 
     count: Count
     why: str = ""
 
 
-def judge(flown: Flown) -> Judged:
+def judge(flown: Flown) -> JudgedFlight:
     """The gravest that is true of it."""
     if flown.grounded:
-        return Judged(Count.GROUNDED, flown.grounded)
-    return _never(flown) or _owed(flown) or _ordered(flown) or Judged(Count.CORRECT)
+        return JudgedFlight(Count.GROUNDED, flown.grounded)
+    return _never(flown) or _owed(flown) or _ordered(flown) or JudgedFlight(Count.CORRECT)
 
 
-def _never(flown: Flown) -> Judged | None:
+def _never(flown: Flown) -> JudgedFlight | None:
     """What must never happen, whatever reached whom."""
     # Motors that are stopped on the ground hurt nobody.
     fires = (Action.DEPLOY,) if flown.scenario.stands else FIRES
@@ -72,33 +72,35 @@ def _never(flown: Flown) -> Judged | None:
         if one.at < known:
             reasons = "; ".join(one.decision.reasons)
             if lied := misled(flown.scenario, flown.up, one.at, reasons):
-                return Judged(Count.NOT_TOLD, lied)
+                return JudgedFlight(Count.NOT_TOLD, lied)
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
-            return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
+            return JudgedFlight(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
     opened = flown.opened_by_kill
     if opened < known or (not math.isnan(opened) and abs(flown.release_height) < _LOWEST):
         text = f"a kill alone opened a parachute {opened - flown.up:.2f} s after it was up"
-        return Judged(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
+        return JudgedFlight(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
     if flown.scenario.stands and not math.isnan(flown.released):
-        return Judged(Count.FALSE, "released on the ground")
+        return JudgedFlight(Count.FALSE, "released on the ground")
     decided = [one.action for _, one in flown.decided if one.action >= Action.KILL]
     if decided and decided[0] is Action.DEPLOY:
-        return Judged(Count.OUT_OF_ORDER, "no kill was decided before the deploy")
+        return JudgedFlight(Count.OUT_OF_ORDER, "no kill was decided before the deploy")
     by_node: dict[str, Action] = {}
     for one in fired:
         first = by_node.setdefault(one.node, one.decision.action)
         if one.decision.action is Action.KILL and first is Action.DEPLOY:
             text = f"{one.node} was told to deploy before it was told to kill"
-            return Judged(Count.OUT_OF_ORDER, text)
+            return JudgedFlight(Count.OUT_OF_ORDER, text)
     if flown.ordered_again:
-        return Judged(Count.DOUBLED, f"{flown.ordered_again} orders after it was known to be out")
+        return JudgedFlight(
+            Count.DOUBLED, f"{flown.ordered_again} orders after it was known to be out"
+        )
     for one in fired:
         if not one.decision.rule or not one.decision.reasons:
-            return Judged(Count.UNEXPLAINED, one.decision.named)
+            return JudgedFlight(Count.UNEXPLAINED, one.decision.named)
     return None
 
 
-def _owed(flown: Flown) -> Judged | None:
+def _owed(flown: Flown) -> JudgedFlight | None:
     """A release that should have been and was not in time; of what a person killed, and wanted no
     more, one that followed. None: neither."""
     alone = _killed_alone_at(flown)
@@ -121,16 +123,16 @@ def _killed_alone_at(flown: Flown) -> float:
     return math.inf
 
 
-def _followed(flown: Flown, alone: float) -> Judged | None:
+def _followed(flown: Flown, alone: float) -> JudgedFlight | None:
     """A deploy followed a person's kill that asked for none; None: none did."""
     for at, one in flown.decided:
         if at >= alone and one.action is Action.DEPLOY:
             text = f"DEPLOY {at - alone:.2f} s after a person's kill that asked for nothing more"
-            return Judged(Count.FALSE, f"{text}: {one.rule}: {'; '.join(one.reasons)}")
+            return JudgedFlight(Count.FALSE, f"{text}: {one.rule}: {'; '.join(one.reasons)}")
     return None
 
 
-def _fallen(flown: Flown) -> Judged | None:
+def _fallen(flown: Flown) -> JudgedFlight | None:
     """It should have been released; None: it should not, or was in time."""
     truth, scenario = flown.truth, flown.scenario
     soft = SOFT_UNDER_DROGUE if scenario.is_rocket else SOFT
@@ -144,18 +146,18 @@ def _fallen(flown: Flown) -> Judged | None:
     enough, hidden = enough_time(scenario), scenario.tape.shows_after if scenario.tape else 0.0
     left = truth.leeway - hidden
     if not left >= enough:
-        return Judged(Count.NO_TIME, f"{left:.2f} s were left (need {enough:g} s)")
+        return JudgedFlight(Count.NO_TIME, f"{left:.2f} s were left (need {enough:g} s)")
     need = Need(truth.at + hidden, truth.latest)
     if blind := blinded(scenario, flown.up, need, _seen(flown)):
-        return Judged(Count.NOT_TOLD, blind)
+        return JudgedFlight(Count.NOT_TOLD, blind)
     if flown.refused <= truth.latest:
-        return Judged(Count.NOT_TOLD, _REFUSED)
+        return JudgedFlight(Count.NOT_TOLD, _REFUSED)
     if math.isnan(flown.released):
-        return Judged(Count.MISSED, f"{left:.2f} s were left")
-    return Judged(Count.LATE, f"{flown.released - truth.latest:.2f} s after the last moment")
+        return JudgedFlight(Count.MISSED, f"{left:.2f} s were left")
+    return JudgedFlight(Count.LATE, f"{flown.released - truth.latest:.2f} s after the last moment")
 
 
-def _not_carried(flown: Flown) -> Judged | None:
+def _not_carried(flown: Flown) -> JudgedFlight | None:
     """What came out does not carry: somebody must be told, and the next parachute must follow."""
     scenario, out = flown.scenario, flown.released
     # Of one that has not come down when its flight ends nobody knows yet.
@@ -163,26 +165,28 @@ def _not_carried(flown: Flown) -> Judged | None:
         return None
     due = flown.another.at + _CARRIES_WITHIN
     if blind := blinded(scenario, flown.up, Need(flown.another.at, due), _seen(flown)):
-        return Judged(Count.NOT_TOLD, blind)
+        return JudgedFlight(Count.NOT_TOLD, blind)
     if flown.landed < due:
-        return Judged(Count.NO_TIME, f"{flown.landed - out:.2f} s from its release to the ground")
+        return JudgedFlight(
+            Count.NO_TIME, f"{flown.landed - out:.2f} s from its release to the ground"
+        )
     followed = [at for at, one in flown.decided if one.action is Action.DEPLOY]
     told = [*followed, *(at for at, _ in flown.alarmed)]
     if not any(flown.another.at <= at <= due for at in told):
-        return Judged(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
+        return JudgedFlight(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
     parachutes = scenario.carries.supervised("deploy_links")
     if len(parachutes) < 2 or flown.released_another <= flown.another.latest:
         return None
     if flown.another.leeway < _CARRIES_WITHIN:
-        return Judged(Count.NO_TIME, f"{flown.another.leeway:.2f} s were left for another")
-    return Judged(Count.MISSED, "the canopy did not carry, and no other followed in time")
+        return JudgedFlight(Count.NO_TIME, f"{flown.another.leeway:.2f} s were left for another")
+    return JudgedFlight(Count.MISSED, "the canopy did not carry, and no other followed in time")
 
 
 def _seen(flown: Flown) -> Seen:
     return Seen(flown.told, flown.light_until, flown.unclear)
 
 
-def _ordered(flown: Flown) -> Judged | None:
+def _ordered(flown: Flown) -> JudgedFlight | None:
     """A person's order must be carried out; None: there was none, or it was."""
     person, scenario = flown.scenario.person, flown.scenario
     if person is None:
@@ -196,7 +200,7 @@ def _ordered(flown: Flown) -> Judged | None:
     if done or latest - due < enough_time(scenario):
         return None
     if blind := blinded(scenario, flown.up, Need(due, latest), Seen(flown.told)):
-        return Judged(Count.NOT_TOLD, blind)
+        return JudgedFlight(Count.NOT_TOLD, blind)
     if person.does == "deploy" and flown.refused <= latest:
-        return Judged(Count.NOT_TOLD, _REFUSED)
-    return Judged(Count.MISSED, f"a person's {person.does}: {flown.answer or 'no answer'}")
+        return JudgedFlight(Count.NOT_TOLD, _REFUSED)
+    return JudgedFlight(Count.MISSED, f"a person's {person.does}: {flown.answer or 'no answer'}")

@@ -27,7 +27,7 @@ GRAIN = 1.0
 
 
 @dataclass(frozen=True)
-class Stage:
+class FallStage:
     """s since the failure, and m of height lost since; NaN: it did not come to that."""
 
     after: float = math.nan
@@ -43,9 +43,9 @@ class Fall:
     ended_before: it was released before the failure, as faults around it may do."""
 
     height: float
-    decided: Stage
-    released: Stage
-    carried: Stage
+    decided: FallStage
+    released: FallStage
+    carried: FallStage
     touchdown: float
     ended_before: bool = False
 
@@ -55,7 +55,7 @@ class Fall:
         return not math.isnan(self.released.after)
 
     @property
-    def noticed(self) -> Stage:
+    def noticed(self) -> FallStage:
         """The supervisor's order, or a release that came before any."""
         return self.decided if self.decided.after <= self.released.after else self.released
 
@@ -118,7 +118,9 @@ class ObservedFlight(Flight):
         if flown.grounded:
             raise CampaignError(f"seed {self.scenario.seed} never took off: {flown.grounded}")
         if flown.released < self._failed_at:
-            return Fall(math.nan, Stage(), Stage(), Stage(), math.nan, ended_before=True)
+            return Fall(
+                math.nan, FallStage(), FallStage(), FallStage(), math.nan, ended_before=True
+            )
         decided = [
             at for at, one in flown.decided if one.action is Action.KILL and at >= self._failed_at
         ]
@@ -148,11 +150,11 @@ class ObservedFlight(Flight):
         ):
             self._carried = now
 
-    def _stage(self, at: float) -> Stage:
+    def _stage(self, at: float) -> FallStage:
         if math.isnan(at):
-            return Stage()
+            return FallStage()
         row = min(bisect.bisect_left(self._times, at), len(self._times) - 1)
-        return Stage(at - self._failed_at, self._heights[0] - self._heights[row])
+        return FallStage(at - self._failed_at, self._heights[0] - self._heights[row])
 
     def _touchdown(self, flown: Flown) -> float:
         """What is still in the air when nobody looks on any more goes on as it sinks then."""

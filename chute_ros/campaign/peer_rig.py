@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from chute_ros.campaign.aircraft import Aircraft
 from chute_ros.campaign.estimator import EstimatorFault
-from chute_ros.campaign.peers.api import Belief, Order, Peer
+from chute_ros.campaign.peers.api import Belief, Peer, PeerDecision
 from chute_ros.campaign.scenario import Fault, HomeMove, Scenario
 from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
@@ -61,7 +61,7 @@ class PeerAircraft(Aircraft):
         if isinstance(fault, _FELT):
             super().plan_one(fault, up)
 
-    def _ordered(self, order: Order) -> None:
+    def _ordered(self, order: PeerDecision) -> None:
         """The motors are off with a kill; with a deploy the parachute is out."""
         number = len(self._acted) + 1
         decision = Decision(1, number, order.action, order.rule, order.reasons, (_NAME,))
@@ -81,7 +81,7 @@ class DecidingAutopilot(CampaignAutopilot):
         sensors: Sensors,
         kind: AutopilotKind,
         make_peer: MakePeer,
-        ordered: Callable[[Order], None],
+        ordered: Callable[[PeerDecision], None],
     ) -> None:
         self._make_peer, self._ordered = make_peer, ordered
         super().__init__(model, sensors, kind)

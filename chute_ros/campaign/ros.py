@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from chute_ros.campaign.channel import Channel, Nature, Way
+from chute_ros.campaign.channel import Channel, Delivery, Way
 from chute_ros.campaign.sensor_messages import Imu, Odometry
 from chute_ros.campaign.world import World
 from chute_ros.model import Decision
@@ -15,7 +15,7 @@ from chute_ros.runtime.topics import ActionTold, DeviceBeat
 from chute_ros.supervisor.decision_gate import in_order
 
 #: From a publisher to a subscription on one host, s.
-_NATURE = Nature(0.0005, in_order=True)
+_DELIVERY = Delivery(0.0005, in_order=True)
 #: What a queue keeps of what nobody reads, one of decisions (ros/qos.py), and one of sensors.
 _QUEUE, _DECISIONS, _SENSORS = 10, 50, 5
 
@@ -128,5 +128,5 @@ class Ros:
             drawn = _DRAWN_AS.get(kind, kind.__name__)
             seed = f"{self._seed} {source.name} {to.name} {drawn}"
             ways = (source.outward, to.inward)
-            channel = self._channels[key] = Channel(self.world, seed, _NATURE, ways)
+            channel = self._channels[key] = Channel(self.world, seed, _DELIVERY, ways)
         channel.send((message,), lambda ones, now: to.deliver(ones[0], stamp, take, sent, now))

@@ -30,7 +30,7 @@ class Failure(enum.Enum):
 
     NOTHING = "nothing fails"
     MOTOR = "a motor fails"
-    REBOOT = "the autopilot starts anew, and does not hold the vehicle"
+    REBOOT = "the autopilot restarts, and does not hold the vehicle"
     POWER = "the vehicle's power fails, and with it the autopilot"
     HANG = "the autopilot hangs, and the vehicle flies on"
     SINK = "a part of its thrust is lost, and it sinks upright"
@@ -39,7 +39,7 @@ class Failure(enum.Enum):
     NO_DROGUE = "the drogue does not come by itself at the apogee"
     TAPE = "its tape's failure"
     FAULT = "the flight computer goes to Fault"
-    COMPUTER_REBOOT = "the flight computer starts anew"
+    COMPUTER_REBOOT = "the flight computer restarts"
     COMPUTER_POWER = "the flight computer has no power any more"
     COMPUTER_SILENT = "the flight computer falls silent, and does its work"
 

@@ -51,7 +51,7 @@ class TapedModel(WindyModel):
         return math.copysign(tilt_of(self.roll, self.pitch), self.roll)
 
     def step(self, dt: float) -> None:
-        """Move on: the tape has a row for each step of nature."""
+        """Move on: the tape has a row for each step of the physics."""
         if self.plays and self.armed and math.isnan(self.released_for):
             self.row += 1
             self._be_there()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.campaign.estimator import Estimator
-from chute_ros.campaign.manoeuvre import Manoeuvre, Motion
+from chute_ros.campaign.manoeuvre import Manoeuvre, ManoeuvreMotion
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
@@ -44,7 +44,7 @@ class WindyModel(GustyModel):
             return
         super().step(dt)
 
-    def _manoeuvre(self, dt: float) -> Motion | None:
+    def _manoeuvre(self, dt: float) -> ManoeuvreMotion | None:
         """What it is told to fly; whoever is out of control does not."""
         if self.manoeuvre is None or not self.controlled:
             self.manoeuvre = None
@@ -61,7 +61,7 @@ def lift_time(height: float) -> float:
     return math.ceil(height / (_LIFT * STEP)) * STEP
 
 
-class Nature:
+class Physics:
     """Moves the vehicle on, whoever hangs or has no power. ground: under it once it is up, m above
     its take-off; moved: called after each step."""
 
@@ -91,7 +91,7 @@ class Nature:
 
 
 class CampaignAutopilot(AutopilotDevice):
-    """Tells what its estimator and its sensors say; nature moves the vehicle."""
+    """Tells what its estimator and its sensors say; the physics move the vehicle."""
 
     def __init__(self, model: WindyModel, sensors: Sensors, kind: AutopilotKind) -> None:
         super().__init__(1, [], model, kind)
@@ -102,7 +102,7 @@ class CampaignAutopilot(AutopilotDevice):
         self.released_at = math.nan
 
     def _fly(self, now: float) -> None:
-        """Nature does."""
+        """The physics do."""
 
     def next_step(self) -> float:
         return min([when for when, _ in self._later], default=math.inf)

@@ -16,7 +16,7 @@ from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import DeviceRuntime
 from chute_ros.runtime.topics import ParachuteTold, SafetyPicture, SupervisorBeat, VehicleTold
-from chute_ros.supervisor.decision_gate import Verdict
+from chute_ros.supervisor.decision_gate import DecisionVerdict
 
 _HEARTBEAT_INTERVAL = 0.1  # s
 
@@ -159,9 +159,9 @@ class VirtualNode(Plug):
 
     def _decide(self, decision: Decision, difference: float, now: float) -> None:
         verdicts = self.runtime.decisions.verdicts
-        before = verdicts[Verdict.ACT]
+        before = verdicts[DecisionVerdict.ACT]
         self.runtime.heard_decisions(((decision, difference),), now)
-        if verdicts[Verdict.ACT] > before:
+        if verdicts[DecisionVerdict.ACT] > before:
             self.acted.append(Acted(now, self.name, decision))
         self.after()
 

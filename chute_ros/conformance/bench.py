@@ -16,7 +16,7 @@ class NotAllowedError(ChuteError):
 
 
 @dataclass(frozen=True)
-class HeardPacket:
+class ReceivedPacket:
     """What the device sent, by the name of its message. at: monotonic s."""
 
     at: float
@@ -24,17 +24,17 @@ class HeardPacket:
     packet: Packet
 
 
-HeardT = TypeVar("HeardT", bound=HeardPacket)
+ReceivedT = TypeVar("ReceivedT", bound=ReceivedPacket)
 
 
 def first_of(
-    heard: Sequence[HeardT], since: int, fits: Callable[[HeardT], bool]
-) -> Callable[[], HeardT | None]:
+    heard: Sequence[ReceivedT], since: int, fits: Callable[[ReceivedT], bool]
+) -> Callable[[], ReceivedT | None]:
     """What returns the first one from this place of heard on that fits; None: it has not come.
     Each is looked at once, however often this is asked."""
     place, first = since, None
 
-    def found() -> HeardT | None:
+    def found() -> ReceivedT | None:
         nonlocal place, first
         while first is None and place < len(heard):
             one = heard[place]
@@ -45,7 +45,7 @@ def first_of(
     return found
 
 
-class RecordingBench(Generic[HeardT]):
+class RecordingBench(Generic[ReceivedT]):
     """heard: of the device, in their order; watched: what the last watch saw. risk: the highest
     that the person allows."""
 
@@ -55,8 +55,8 @@ class RecordingBench(Generic[HeardT]):
         self.done = Risk.NONE
         self.now, self.heard_at = 0.0, -math.inf
         self.traffic: list[Packet] = []
-        self.heard: list[HeardT] = []
-        self.watched: list[HeardT] = []
+        self.heard: list[ReceivedT] = []
+        self.watched: list[ReceivedT] = []
         #: What the clause that is tried has judged of what came before: it proves its verdict.
         self.looked_at: list[Packet] = []
         #: How often the device was seen to start anew.
@@ -107,14 +107,14 @@ class RecordingBench(Generic[HeardT]):
         return ""
 
     def wait_for(
-        self, kind: str, within: float, fits: Callable[[HeardT], bool] = lambda one: True
+        self, kind: str, within: float, fits: Callable[[ReceivedT], bool] = lambda one: True
     ) -> Any:
         """The next message of this kind from the device that fits; None: none came within (s)."""
         found = first_of(self.heard, len(self.heard), lambda one: one.kind == kind and fits(one))
         yield Wait(self.now + within, found)
         return found()
 
-    def look_at(self, heard: Iterable[HeardT]) -> list[HeardT]:
+    def look_at(self, heard: Iterable[ReceivedT]) -> list[ReceivedT]:
         """These, which the clause that is tried judges, and which may have come before it."""
         every = list(heard)
         self.looked_at += [one.packet for one in every]

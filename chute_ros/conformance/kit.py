@@ -9,7 +9,7 @@ from typing import Any
 
 from chute_ros.conformance.clause import SOAK, Clause, Risk
 from chute_ros.conformance.session import Allowed, Bench, Session
-from chute_ros.conformance.virtual import Device, VirtualLine
+from chute_ros.conformance.virtual import VirtualDevice, VirtualLine
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Kit:
     bench: Callable[[Namespace, Risk], Bench]
     wire: Callable[[Namespace], Any]
     fires: str
-    simulated: Callable[[str, str], tuple[Device, Bench]]
+    simulated: Callable[[str, str], tuple[VirtualDevice, Bench]]
 
     def virtual(self, broken: str) -> VirtualLine:
         """A simulated device that breaks this clause (empty: none), and what tries it, in virtual

@@ -65,7 +65,7 @@ class Allowed:
 
 
 @dataclass(frozen=True)
-class Found:
+class DeviceFound:
     """The device was found: who it is."""
 
     text: str
@@ -95,7 +95,7 @@ Steps = Generator[Wait, bool, None]
 
 
 class Session(Generic[BenchT]):
-    """A ProtocolLink (transport/loop.py). Its events are Found, Trying, Result and Ended."""
+    """A ProtocolLink (transport/loop.py). Its events are DeviceFound, Trying, Result and Ended."""
 
     def __init__(self, bench: BenchT, clauses: Sequence[Clause[BenchT]], allowed: Allowed) -> None:
         self.bench, self._clauses, self._allowed = bench, clauses, allowed
@@ -161,7 +161,7 @@ class Session(Generic[BenchT]):
         except DecidedError as decided:
             self._events.append(Ended(str(decided)))
             return
-        self._events.append(Found(who))
+        self._events.append(DeviceFound(who))
         problem, before, starts = "", "", self.bench.starts
         for number, clause in enumerate(self._clauses, start=1):
             if not problem and (yield from self._silent()):
@@ -176,7 +176,7 @@ class Session(Generic[BenchT]):
             verdict, why, proof = yield from self._tried(clause)
             restarted = self.bench.starts > starts and not clause.restarts
             if restarted and verdict is not Verdict.FAILED:
-                verdict, why = Verdict.FAILED, f"it started anew meanwhile ({why})"
+                verdict, why = Verdict.FAILED, f"it restarted meanwhile ({why})"
             starts = self.bench.starts
             shown = proof or self._judged(first)
             took = self.bench.now - began

@@ -12,7 +12,7 @@ _ON_THE_LINE = 1e-4
 _BEGINS = 100.0
 
 
-class Device(Protocol):
+class VirtualDevice(Protocol):
     """What of a simulated device is used (transport/loop.py)."""
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
@@ -31,7 +31,7 @@ class Device(Protocol):
 class VirtualLine:
     """sent: all that the session has sent; events: all of the session's."""
 
-    def __init__(self, session: Session[Bench], device: Device) -> None:
+    def __init__(self, session: Session[Bench], device: VirtualDevice) -> None:
         self.now = _BEGINS
         self.sent: list[bytes] = []
         self.events: list[Any] = []

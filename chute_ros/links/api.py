@@ -26,12 +26,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from chute_ros.settings import Value
+
 #: The node that speaks to the autopilot, also where the parachute is on another link.
 AUTOPILOT_LINK = "mavlink_parachute"
 SUPERVISOR = "safety_supervisor"
 #: A text that names an object: "package.module:attribute".
 Place = str
-Value = bool | int | float | str | list[str]
 
 
 class Link(Protocol):
@@ -67,13 +68,6 @@ class Link(Protocol):
 
     def deploy(self, token: int, force: bool, now: float) -> None:
         """Begin to release; ends with a RequestFinished of this token."""
-
-
-class BlockingLink(Link, Protocol):
-    """One that can keep its vehicle on the ground (DeviceRuntime.BLOCKS_FLIGHT)."""
-
-    def flight_block(self, reason: str, now: float) -> None:
-        """Keep the vehicle on the ground for this reason; empty: let it go."""
 
 
 class CampaignPart(Protocol):

@@ -68,7 +68,7 @@ class Notice:
     text: str
 
 
-class Ask(enum.IntEnum):
+class SafetyAsk(enum.IntEnum):
     """What a device asks of the vehicle; numbers of chute_msgs/SafetyRequest."""
 
     KILL = 1
@@ -80,7 +80,7 @@ class Ask(enum.IntEnum):
 class AskSupervisor:
     """Pass this on to the supervisor on the device's behalf."""
 
-    ask: Ask
+    ask: SafetyAsk
     device: str
     reason: str
 

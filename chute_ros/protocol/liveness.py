@@ -20,21 +20,21 @@ from chute_ros.settings import Settings, parameter
 from chute_ros.transitions import after
 
 
-class Event(enum.Enum):
+class LivenessEvent(enum.Enum):
     """What can happen to a link."""
 
-    HEARD = "heard"
+    HEARD = "received"
     STALE_LIMIT = "stale limit passed"
     LOST_LIMIT = "lost limit passed"
 
 
-TRANSITIONS: dict[tuple[LinkState, Event], LinkState] = {
-    (LinkState.NEVER_SEEN, Event.HEARD): LinkState.OK,
-    (LinkState.OK, Event.HEARD): LinkState.OK,
-    (LinkState.OK, Event.STALE_LIMIT): LinkState.STALE,
-    (LinkState.STALE, Event.HEARD): LinkState.OK,
-    (LinkState.STALE, Event.LOST_LIMIT): LinkState.LOST,
-    (LinkState.LOST, Event.HEARD): LinkState.OK,
+TRANSITIONS: dict[tuple[LinkState, LivenessEvent], LinkState] = {
+    (LinkState.NEVER_SEEN, LivenessEvent.HEARD): LinkState.OK,
+    (LinkState.OK, LivenessEvent.HEARD): LinkState.OK,
+    (LinkState.OK, LivenessEvent.STALE_LIMIT): LinkState.STALE,
+    (LinkState.STALE, LivenessEvent.HEARD): LinkState.OK,
+    (LinkState.STALE, LivenessEvent.LOST_LIMIT): LinkState.LOST,
+    (LinkState.LOST, LivenessEvent.HEARD): LinkState.OK,
 }
 
 
@@ -88,7 +88,7 @@ class Liveness:
         changes = self.update(now)
         silence = self.age(now)
         before = self.state
-        changes += self._take(Event.HEARD, now, silence)
+        changes += self._take(LivenessEvent.HEARD, now, silence)
         self.last_heard = now
         if before is LinkState.NEVER_SEEN:
             self.first_heard = now
@@ -102,9 +102,9 @@ class Liveness:
         silence = self.age(now)
         # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
         if self.state is LinkState.OK and now >= self.next_deadline():
-            changes += self._take(Event.STALE_LIMIT, now, silence)
+            changes += self._take(LivenessEvent.STALE_LIMIT, now, silence)
         if self.state is LinkState.STALE and now >= self.next_deadline():
-            changes += self._take(Event.LOST_LIMIT, now, silence)
+            changes += self._take(LivenessEvent.LOST_LIMIT, now, silence)
             self.lost_count += 1
         return changes
 
@@ -120,7 +120,7 @@ class Liveness:
             return self.last_heard + self.limits.lost_after
         return math.inf
 
-    def _take(self, event: Event, now: float, silence: float) -> list[LinkChange]:
+    def _take(self, event: LivenessEvent, now: float, silence: float) -> list[LinkChange]:
         before = self.state
         self.state = after(TRANSITIONS, before, event)
         if self.state is before:

@@ -107,6 +107,6 @@ def _rate(heights: _Words, now: float) -> float:
 def _why(source: str, speed: float, others: dict[str, float], rate: float) -> str:
     each = ", ".join(f"{one} {other:+.1f}" for one, other in others.items())
     return (
-        f"{source} tells a vertical speed of {speed:+.1f} m/s against two origins: {each}, the "
+        f"{source} reports a vertical speed of {speed:+.1f} m/s against two origins: {each}, the "
         f"barometer {rate:+.1f} m/s: its speed and attitude are not used"
     )

@@ -20,7 +20,7 @@ from chute_msgs.msg import (
 )
 
 from chute_ros import model
-from chute_ros.protocol.events import Ask
+from chute_ros.protocol.events import SafetyAsk
 from chute_ros.runtime.topics import (
     ActionTold,
     DeviceBeat,
@@ -118,9 +118,9 @@ def device_request(one: DeviceRequest, stamp: Time) -> SafetyRequest:
 
 def device_request_from(message: SafetyRequest) -> DeviceRequest | None:
     """What somebody published on safety/request; None: it asks for what does not exist."""
-    if message.request not in Ask._value2member_map_:
+    if message.request not in SafetyAsk._value2member_map_:
         return None
-    return DeviceRequest(message.link, message.device, Ask(message.request), message.reason)
+    return DeviceRequest(message.link, message.device, SafetyAsk(message.request), message.reason)
 
 
 def safety_picture(message: SafetyState) -> SafetyPicture:

@@ -17,6 +17,7 @@ from chute_msgs.srv import (
     RequestMessage,
     TransportStats,
 )
+from rclpy.node import Node
 
 from chute_ros.ros import messages, qos
 from chute_ros.ros.plain_border import is_exempt
@@ -32,6 +33,14 @@ _READING = (GetInfo, GetNodeInfo, GetParam, ListParams, RequestMessage, Transpor
 def orders(kind: Any) -> bool:
     """Whether a service of this type orders something of the device. ROS's own do not."""
     return kind not in _READING and not is_exempt(kind)
+
+
+def publish(node: Node, publisher: Any, told: PersonRequest) -> None:
+    """A failure is logged: keeping a record must not keep a parachute from being released."""
+    try:
+        publisher.publish(told)
+    except Exception as error:  # noqa: BLE001
+        node.get_logger().error(f"{told.service} is not in the record: {error}")
 
 
 class PersonRequests:
@@ -53,7 +62,7 @@ class PersonRequests:
                 after=math.nan,
             )
             told.header.stamp = self._node.stamp()
-            self._publish(told)
+            publish(self._node, self._publisher, told)
             answer = callback(request, response)
             if inspect.isawaitable(answer):
                 answer = await answer
@@ -62,14 +71,7 @@ class PersonRequests:
             told.accepted = getattr(answer, "accepted", False)
             told.message = getattr(answer, "message", "")
             told.after = time.monotonic() - called
-            self._publish(told)
+            publish(self._node, self._publisher, told)
             return answer
 
         return served
-
-    def _publish(self, told: PersonRequest) -> None:
-        try:
-            self._publisher.publish(told)
-        except Exception as error:  # noqa: BLE001
-            # Whatever keeps a record must not keep a parachute from being released.
-            self._node.get_logger().error(f"{told.service} is not in the record: {error}")

@@ -35,7 +35,7 @@ from chute_ros.ros.link_log import log_notice
 from chute_ros.ros.suite_node import SuiteNode
 from chute_ros.ros.supervisor_health import Health
 from chute_ros.ros.supervisor_inputs import SupervisorInputs
-from chute_ros.ros.supervisor_memory import Memory
+from chute_ros.ros.supervisor_memory import SupervisorMemory
 from chute_ros.ros.supervisor_messages import (
     decisions_task,
     state_message,
@@ -75,7 +75,7 @@ class SafetySupervisorNode(SuiteNode):
         super().__init__("safety_supervisor", PARAMETERS, **options)
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.config, self.get_name())
-        self._memory = Memory(self, self.values, self.config)
+        self._memory = SupervisorMemory(self, self.values, self.config)
         self.at_end.callback(self._memory.close)
         start = Start(
             # Rises from start to start; a device node that knows a higher one makes us go on

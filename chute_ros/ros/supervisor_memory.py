@@ -37,7 +37,7 @@ from chute_ros.supervisor.state import State
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
-class Memory:
+class SupervisorMemory:
     """In a file of the node's own, where resume_within says that it may be needed.
 
     NameTakenError if a living supervisor of this name is on this computer, whose file it would be.

@@ -10,7 +10,7 @@ from chute_ros.model import Decision, Outcome
 from chute_ros.protocol.events import Notice, Severity
 from chute_ros.runtime.shell import Shell
 from chute_ros.runtime.topics import ActionTold
-from chute_ros.supervisor.decision_gate import DecisionGate, Verdict, in_order
+from chute_ros.supervisor.decision_gate import DecisionGate, DecisionVerdict, in_order
 from chute_ros.supervisor.inputs import ActionReport
 
 #: So many decisions are remembered with how far they got, to be reported once more.
@@ -39,7 +39,7 @@ class DecisionCarrier:
         #: The newest report on each of the newest decisions.
         self._reports: dict[tuple[int, int], ActionTold] = {}
         #: How many of those that came were judged so.
-        self.verdicts: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
+        self.verdicts: dict[DecisionVerdict, int] = dict.fromkeys(DecisionVerdict, 0)
         self._complained = -math.inf
 
     def heard(self, waiting: Iterable[tuple[Decision, float]], now: float) -> None:
@@ -72,21 +72,21 @@ class DecisionCarrier:
     def _judge(self, decision: Decision, age: float, now: float) -> None:
         verdict = self._gate.judge(decision, age)
         self.verdicts[verdict] += 1
-        if verdict is Verdict.ACT:
+        if verdict is DecisionVerdict.ACT:
             # Told afterwards: the wire comes first.
             self._carry_out(decision)
             why = f"({decision.rule}): {'; '.join(decision.reasons)}"
             self._log(Severity.WARNING, f"{_name(decision)} {why}")
-        elif verdict is Verdict.NOT_ADDRESSED and self._gate.counts(decision, age):
+        elif verdict is DecisionVerdict.NOT_ADDRESSED and self._gate.counts(decision, age):
             self._for_others(decision)
-        elif verdict is Verdict.REPEATED:
+        elif verdict is DecisionVerdict.REPEATED:
             # The supervisor has not heard our report, perhaps because it was not there yet.
             told = self._reports.get((decision.epoch, decision.id))
             if told is not None:
                 self._shell.publish(told)
-        elif verdict is Verdict.OLDER:
-            self.report(decision, Outcome.FAILED, Verdict.OLDER.value)
-        elif verdict is Verdict.TOO_LATE and now - self._complained >= _COMPLAIN_EACH:
+        elif verdict is DecisionVerdict.OLDER:
+            self.report(decision, Outcome.FAILED, DecisionVerdict.OLDER.value)
+        elif verdict is DecisionVerdict.TOO_LATE and now - self._complained >= _COMPLAIN_EACH:
             self._complained = now
             self._log(
                 Severity.ERROR,

@@ -129,7 +129,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
     REPLACED: tuple[type, ...] = (VehicleChanged,)
     #: Events that need only be told of, within a heartbeat's interval.
     UNHURRIED: tuple[type, ...] = ()
-    #: What this node says to its device keeps a vehicle on the ground.
+    #: What this node says to its device keeps a vehicle on the ground: the link has
+    #: flight_block(reason, now), where an empty reason lets it go.
     BLOCKS_FLIGHT = True
 
     def __init__(

@@ -10,7 +10,7 @@ from chute_ros.protocol.events import Notice, Severity
 from chute_ros.runtime.topics import LeaseClaim
 from chute_ros.supervisor import handover
 from chute_ros.supervisor.epochs import RANKS
-from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
+from chute_ros.supervisor.lease import Claim, Lease, LeaseConfig, LeaseEvent, Role
 from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state import State
 
@@ -44,7 +44,7 @@ class LeaseOwner(Protocol):
     def links_heard(self, now: float) -> int:
         """How many."""
 
-    def lease_event(self, event: Event, now: float) -> None:
+    def lease_event(self, event: LeaseEvent, now: float) -> None:
         """The role, or whom it leads past, has changed."""
 
     def follow(self, state: State) -> None:

@@ -32,7 +32,7 @@ from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.epochs import epoch_above
-from chute_ros.supervisor.lease import Event, LeaseConfig
+from chute_ros.supervisor.lease import LeaseConfig, LeaseEvent
 from chute_ros.supervisor.state import Own, State
 from chute_ros.supervisor.wakes import next_deadline
 
@@ -257,7 +257,7 @@ class SupervisorRuntime:
         """The leader's state is ours."""
         self.state = state
 
-    def lease_event(self, event: Event, now: float) -> None:
+    def lease_event(self, event: LeaseEvent, now: float) -> None:
         """The leader has changed."""
         leads = self.lease.leading
         if leads:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from chute_ros.protocol.events import Ask
+from chute_ros.protocol.events import SafetyAsk
 from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest
 from chute_ros.supervisor import inputs
 
@@ -30,7 +30,7 @@ def input_of(one: Any, difference: float) -> inputs.Input:
 
 
 def _asked(one: DeviceRequest) -> inputs.Input:
-    if one.ask is Ask.KILL:
+    if one.ask is SafetyAsk.KILL:
         return inputs.KillRequest(0, f"{one.link} {one.device}".strip(), one.reason)
-    block = one.ask is Ask.FLIGHT_BLOCK
+    block = one.ask is SafetyAsk.FLIGHT_BLOCK
     return inputs.BlockRequest(one.link, one.device, block, one.reason)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chute_ros.model import Action, Decision, LinkState
-from chute_ros.protocol.events import Ask
+from chute_ros.protocol.events import SafetyAsk
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import ActionReport, ParachuteReport, VehicleReport
 from chute_ros.supervisor.lease import Claim
@@ -134,5 +134,5 @@ class DeviceRequest:
 
     link: str
     device: str
-    ask: Ask
+    ask: SafetyAsk
     reason: str

@@ -18,7 +18,7 @@ STUCK, TRUTH = "stuck", "truth"
 LIES = (*_RUNS_AWAY, STUCK, TRUTH)
 
 
-class Belief(NamedTuple):
+class Estimate(NamedTuple):
     """m above take-off, m/s up, rad."""
 
     height: float
@@ -32,21 +32,21 @@ class LyingEstimator:
     def __init__(self) -> None:
         self._kind, self._since = TRUTH, math.nan
         #: What it repeats.
-        self._kept = Belief(0.0, 0.0, 0.0)
+        self._kept = Estimate(0.0, 0.0, 0.0)
 
     def lie(self, kind: str, model: FlightModel, now: float) -> None:
         """From now on in this way, one of LIES."""
         self._kept = self.belief(model, now)
         self._kind, self._since = kind, now
 
-    def belief(self, model: FlightModel, now: float) -> Belief:
+    def belief(self, model: FlightModel, now: float) -> Estimate:
         """By now."""
         if self._kind == STUCK:
             return self._kept
         made_up, passed = _RUNS_AWAY.get(self._kind, 0.0), now - self._since
         if not made_up:
-            return Belief(model.height, model.vertical_speed, model.roll)
+            return Estimate(model.height, model.vertical_speed, model.roll)
         grows = min(passed, _GROWS)
         speed = made_up * grows / _GROWS
         height = speed * grows / 2.0 + made_up * (passed - grows)
-        return Belief(model.height + height, model.vertical_speed + speed, model.roll)
+        return Estimate(model.height + height, model.vertical_speed + speed, model.roll)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
+from chute_ros.supervisor.machine import ON_GROUND, Stage, StageEvent, listed
 from chute_ros.supervisor.orders import armed_since, note_released
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.samples import on_earth
@@ -24,17 +24,17 @@ def check_vehicle(turn: Turn) -> None:
     blocked = stage in (Stage.STARTUP, Stage.BLOCKED)
     if in_air and blocked and flight.low_as_at_take_off(turn.config, turn.state, turn.now):
         return  # it says so because it was ordered to take off, and is kept down
-    if in_air and listed(stage, Event.TAKEN_OFF) and _may_take_off(turn):
+    if in_air and listed(stage, StageEvent.TAKEN_OFF) and _may_take_off(turn):
         if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
             turn.alarm(f"took off although {stage.name}")
-        turn.move(Event.TAKEN_OFF)
+        turn.move(StageEvent.TAKEN_OFF)
         _took_off(turn, anew=stage is not Stage.LANDED, armed=stage is Stage.ARMED)
     elif in_air and _falls_since_kill(turn):
-        turn.alarm("it falls since the kill, although it said that it stood")
+        turn.alarm("it falls since the kill, although it was reported to stand")
         turn.flight = replace(turn.flight, airborne=True, airborne_since=turn.now)
         turn.killing = replace(turn.killing, killed_in_flight=True)
-    elif in_air is False and listed(stage, Event.LANDED):
-        turn.move(Event.LANDED)
+    elif in_air is False and listed(stage, StageEvent.LANDED):
+        turn.move(StageEvent.LANDED)
         turn.flight = replace(turn.flight, airborne=False, rebooted=False, landed_at=turn.now)
     if in_air is False and not math.isnan(turn.killing.killed_height):
         # It has come down, whatever is told, or not told any more, from now on.
@@ -44,7 +44,7 @@ def check_vehicle(turn: Turn) -> None:
         turn.flight = replace(turn.flight, airborne=False, rebooted=False, landed_at=turn.now)
         turn.killing = replace(turn.killing, killed_in_flight=False)
     if turn.state.stage is Stage.LANDED and flight.disarmed(turn.config, turn.state, turn.now):
-        turn.move(Event.SECURED)
+        turn.move(StageEvent.SECURED)
         _disarm_parachutes(turn)
     if in_air is False and not turn.flight.flown and turn.state.stage in ON_GROUND:
         note_released(turn)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.machine import Event, Stage, listed
+from chute_ros.supervisor.machine import Stage, StageEvent, listed
 from chute_ros.supervisor.preflight import block_reasons, not_seen
 from chute_ros.supervisor.sending import decide, kill_failed, worth_sending
 from chute_ros.supervisor.turn import Turn
 
 #: What the health of the links can do; in flight nothing.
-_OF_LINKS = (Event.LINKS_UNHEALTHY, Event.LINKS_HEALTHY)
+_OF_LINKS = (StageEvent.LINKS_UNHEALTHY, StageEvent.LINKS_HEALTHY)
 #: Once the parachutes were armed or disarmed, their own status says so within this time, s.
 ARMED_SHOWS = 2.0
 
@@ -32,12 +32,12 @@ def check_armed(turn: Turn) -> None:
         if told:
             text = "no parachute says any more that it is armed"
             turn.warn(text)
-            turn.move(Event.DISARMED, text)
+            turn.move(StageEvent.DISARMED, text)
 
 
 def _show_armed(turn: Turn, armed: list[tuple[str, str]]) -> None:
     if armed:
-        turn.move(Event.ARMED, f"{', '.join(map(' '.join, armed))} says armed")
+        turn.move(StageEvent.ARMED, f"{', '.join(map(' '.join, armed))} says armed")
 
 
 def check_links(turn: Turn) -> None:
@@ -49,7 +49,7 @@ def check_links(turn: Turn) -> None:
     starting = turn.now < turn.state.started_at + grace
     if stage is Stage.STARTUP and reasons and starting:
         return
-    event = Event.LINKS_UNHEALTHY if reasons else Event.LINKS_HEALTHY
+    event = StageEvent.LINKS_UNHEALTHY if reasons else StageEvent.LINKS_HEALTHY
     if listed(stage, event):
         turn.move(event, "; ".join(reasons))
         if not reasons:
@@ -59,7 +59,9 @@ def check_links(turn: Turn) -> None:
             heard = [one for one in last_said if turn.state.hears(turn.config, one[0], turn.now)]
             mute = [link for link in turn.config.deploy_links if turn.state.unmonitored(link)]
             if not heard and mute and turn.flight.armed_on_ground:
-                turn.move(Event.ARMED, f"{', '.join(mute)} was armed, and cannot tell otherwise")
+                turn.move(
+                    StageEvent.ARMED, f"{', '.join(mute)} was armed, and cannot report otherwise"
+                )
             _show_armed(turn, heard)
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")

@@ -131,7 +131,7 @@ class SupervisorConfig(Settings):
     )
     vehicle_source_rate: float = parameter(
         5.0,
-        "take-off is forbidden if another source of vehicle_sources than vehicle/state tells "
+        "take-off is forbidden if another source of vehicle_sources than vehicle/state reports "
         "height, vertical speed, attitude or acceleration at a lower rate, or is never received; "
         "0: not checked",
         0.0,

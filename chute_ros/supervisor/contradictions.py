@@ -4,9 +4,9 @@ Height, vertical speed and attitude of an autopilot are one estimator: when it g
 wrong with itself. The barometer and the accelerometer are origins of their own. A claim that they
 contradict is denied, with the reason:
 
-- a sink of the estimator, where the barometer tells none, or has not come down by what it takes to
-  speed up so much since it was last heard; without a barometer, where no force was
-  missing while it is said to have speeded up. An accelerometer that feels the fall does not speak
+- a sink of the estimator, where the barometer reports none, or has not come down by what it takes
+  to speed up so much since it was last received; without a barometer, where no force was missing
+  while it is said to have speeded up. An accelerometer that feels the fall does not speak
   for it: where motors shake it, it tells too little, and the estimator that flies on it sinks;
 - a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
   downwards by 9.8 - f at least);
@@ -148,7 +148,7 @@ def _last(motion: tuple[Moment, ...], seconds: float) -> list[Moment]:
 
 def _told_meanwhile(motion: tuple[Moment, ...], barometer: Rise) -> float:
     """The vertical speed over the barometer's time: in a fall that speeds up the newest is twice
-    as much. NaN: none was told, or the barometer tells nothing."""
+    as much. NaN: none was told, or the barometer reports nothing."""
     begin, end = barometer.since - _APART, barometer.until + _APART
     speeds = [one[1] for one in motion if begin <= one[0] <= end and not math.isnan(one[1])]
     return fmean(speeds) if speeds else math.nan
@@ -162,7 +162,7 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
         return _not_fallen(motion, drop) or _not_felt(motion)
     if barometer.rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
         return ""
-    return f"the barometer tells {barometer.rate:+.1f} m/s where it tells {told:+.1f}"
+    return f"the barometer reports {barometer.rate:+.1f} m/s where it reports {told:+.1f}"
 
 
 def felt_drop(motion: tuple[Moment, ...]) -> float:
@@ -230,7 +230,8 @@ def height_denied(height: float, by_pressure: float) -> str:
     if not abs(height - by_pressure) > max(_HEIGHTS_DIFFER, _OF_HEIGHT * abs(height)):
         return ""
     return (
-        f"the barometer tells {by_pressure:.0f} m above the take-off where it tells {height:.0f}"
+        f"the barometer reports {by_pressure:.0f} m above the take-off where it reports "
+        f"{height:.0f}"
     )
 
 
@@ -250,8 +251,8 @@ def _not_fallen(motion: tuple[Moment, ...], drop: Drop) -> str:
     if drop.by + _BAROMETER_ERRS >= _OF_SINK * least:
         return ""
     return (
-        f"it tells {motion[-1][1]:+.1f} m/s, for which it came down by {least:.1f} m at least in "
-        f"{drop.passed:.1f} s, and the barometer tells {drop.by:.1f} m"
+        f"it reports {motion[-1][1]:+.1f} m/s, for which it came down by {least:.1f} m at least "
+        f"in {drop.passed:.1f} s, and the barometer reports {drop.by:.1f} m"
     )
 
 
@@ -272,7 +273,9 @@ def _not_felt(motion: tuple[Moment, ...]) -> str:
             best, over = more, passed
     if best <= _NOT_FELT:
         return ""
-    return f"it sinks {best:.1f} m/s faster than {over:.1f} s before, of which no force tells"
+    return (
+        f"it sinks {best:.1f} m/s faster than {over:.1f} s before, of which no force is reported"
+    )
 
 
 def _still_denied(motion: tuple[Moment, ...], barometer: Rise, before: Mapping[str, str]) -> str:
@@ -318,7 +321,7 @@ def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
         return _carried_leaning(motion)
     force = fmean([one[2] for one in known])
     if barometer.rate >= -_LIES_AND_SINKS:
-        told = f"the barometer tells {barometer.rate:+.1f} m/s"
+        told = f"the barometer reports {barometer.rate:+.1f} m/s"
         return f"a force of {force:.1f} m/s^2 carries it, and {told}"
     if known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
         return ""

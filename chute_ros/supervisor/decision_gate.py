@@ -11,12 +11,12 @@ from typing import Protocol, TypeVar
 from chute_ros.model import Action, Decision
 
 
-class Verdict(enum.Enum):
+class DecisionVerdict(enum.Enum):
     """What a device node does with a decision."""
 
     ACT = "acts on it"
     NOT_ADDRESSED = "addressed to others"
-    SHADOW = "shadow: only said, not done"
+    SHADOW = "shadow: only reported, not done"
     REPEATED = "the same as one already acted on"
     OLDER = "older than one already seen"
     TOO_LATE = "came too late"
@@ -64,27 +64,27 @@ class DecisionGate:
     #: a refusal: its outcome is what the supervisor has not heard.
     acted: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=50))
 
-    def judge(self, decision: Decision, age: float) -> Verdict:
+    def judge(self, decision: Decision, age: float) -> DecisionVerdict:
         """What to do with decision, which is age seconds old. Of one for others the epoch is
         remembered, of one for this link that it was acted on."""
         if self.link not in decision.targets:
             self._note_term(decision, age)
-            return Verdict.NOT_ADDRESSED
+            return DecisionVerdict.NOT_ADDRESSED
         if decision.shadow:
-            return Verdict.SHADOW
+            return DecisionVerdict.SHADOW
         order = (decision.epoch, decision.id)
         newer = order > (self.newest_epoch, self.newest_id)
         if order in self.acted:
-            return Verdict.REPEATED
+            return DecisionVerdict.REPEATED
         if not newer and not self._missed_kill(decision):
-            return Verdict.OLDER
+            return DecisionVerdict.OLDER
         if not self._young(age):
-            return Verdict.TOO_LATE
+            return DecisionVerdict.TOO_LATE
         if newer:
             self.newest_epoch, self.newest_id = order
             self.newest_action = decision.action
         self.acted.append(order)
-        return Verdict.ACT
+        return DecisionVerdict.ACT
 
     def counts(self, decision: Decision, age: float) -> bool:
         """One for others, judged before, is of who leads now, meant, and new enough to be acted on

@@ -8,7 +8,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_details, deploy_reached, end_kill, finish_deploy
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.gate import OPERATOR, too_low
-from chute_ros.supervisor.machine import Event, Stage, listed
+from chute_ros.supervisor.machine import Stage, StageEvent, listed
 from chute_ros.supervisor.orders import armed_since, order_deploy, order_kill
 from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.policy import put_off
@@ -41,13 +41,13 @@ def release_due(config: SupervisorConfig, state: State, now: float) -> float:
 def check_parachutes(turn: Turn) -> None:
     """One that says that it is released ends every deploy, whoever fired it."""
     out = sorted(turn.state.newly_released(turn.config, turn.now))
-    if out and listed(turn.state.stage, Event.PARACHUTE_OPEN):
+    if out and listed(turn.state.stage, StageEvent.PARACHUTE_OPEN):
         said = f"{', '.join(map(' '.join, out))} says deployed"
         _note_open(turn, said)
 
 
 def _note_open(turn: Turn, why: str) -> None:
-    turn.move(Event.PARACHUTE_OPEN, why)
+    turn.move(StageEvent.PARACHUTE_OPEN, why)
     height = readings.measured(turn.config, turn.state, "height", turn.now)
     turn.deploying = replace(turn.deploying, deploy_height=height)
 
@@ -78,7 +78,7 @@ def check_kill(turn: Turn) -> None:
         waited = turn.now - kill.decided_at
         why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
         limit = _limit(turn, kill)
-        turn.move(Event.DEPLOY_DUE, why)
+        turn.move(StageEvent.DEPLOY_DUE, why)
         _fire(turn, f"{why} ({limit})")
 
 
@@ -88,7 +88,7 @@ def _kill_again(turn: Turn, kill: Pending) -> None:
     was_off = turn.before.heard.vehicle.armed is Armed.DISARMED
     if was_off and kill.confirmed and armed_since(turn, kill):
         why = "the motors were armed again under a canopy that is out"
-        turn.alarm(f"{why}: they are stopped once more")
+        turn.alarm(f"{why}: they are stopped again")
         order_kill(turn, "armed under the canopy", (why,))
 
 
@@ -98,7 +98,7 @@ def _limit(turn: Turn, kill: Pending) -> str:
     low = release_due(config, turn.state, turn.now) < turn.deploying.deploy_due
     if kill.confirmed or not low:
         return f"limit {config.kill_to_deploy_delay:g} s"
-    told = f"{height.value:.1f} m told {turn.now - height.measured_at:.2f} s ago"
+    told = f"{height.value:.1f} m reported {turn.now - height.measured_at:.2f} s ago"
     limit = f"limit {config.low_kill_to_deploy_delay:g} s below {config.profile.low_height:g} m"
     return f"{limit}: {told}"
 
@@ -160,7 +160,7 @@ def _climb(turn: Turn) -> None:
             return
         if last:
             first = turn.deploying.deploys[0].decided_at
-            turn.move(Event.DEPLOY_FAILED, text)
+            turn.move(StageEvent.DEPLOY_FAILED, text)
             limit = "and none can be" if unconfirmable else f"within {turn.now - first:.1f} s"
             turn.alarm(f"no parachute confirmed {limit}: {text}")
             alarm_at = turn.now + turn.config.alarm_interval

@@ -26,11 +26,11 @@ class Role(enum.Enum):
     FOLLOWING = "following"  # looks on, with the leader's state
 
 
-class Event(enum.Enum):
+class LeaseEvent(enum.Enum):
     """What can happen to the lease."""
 
-    SILENCE = "no leader was heard for the lease's time"
-    HEARS_MORE = "the leader hears fewer links than this one"
+    SILENCE = "no leader's heartbeat was received for the lease's time"
+    HEARS_MORE = "the leader receives fewer links than this one"
     KNOWS_MORE = "the leader knows of no flight, and this one does"
     OUTRANKED = "another leads with the better claim"
     OVERSLEPT = "this one did not look for longer than the lease's time"
@@ -38,14 +38,14 @@ class Event(enum.Enum):
     OVERTAKES = "another leads with a higher epoch and the weaker claim"
 
 
-TRANSITIONS: dict[tuple[Role, Event], Role] = {
-    (Role.FOLLOWING, Event.SILENCE): Role.LEADING,
-    (Role.FOLLOWING, Event.HEARS_MORE): Role.LEADING,
-    (Role.FOLLOWING, Event.KNOWS_MORE): Role.LEADING,
-    (Role.LEADING, Event.OUTRANKED): Role.FOLLOWING,
-    (Role.LEADING, Event.OVERSLEPT): Role.FOLLOWING,
-    (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
-    (Role.LEADING, Event.OVERTAKES): Role.LEADING,
+TRANSITIONS: dict[tuple[Role, LeaseEvent], Role] = {
+    (Role.FOLLOWING, LeaseEvent.SILENCE): Role.LEADING,
+    (Role.FOLLOWING, LeaseEvent.HEARS_MORE): Role.LEADING,
+    (Role.FOLLOWING, LeaseEvent.KNOWS_MORE): Role.LEADING,
+    (Role.LEADING, LeaseEvent.OUTRANKED): Role.FOLLOWING,
+    (Role.LEADING, LeaseEvent.OVERSLEPT): Role.FOLLOWING,
+    (Role.LEADING, LeaseEvent.REFUSED): Role.FOLLOWING,
+    (Role.LEADING, LeaseEvent.OVERTAKES): Role.LEADING,
 }
 
 
@@ -119,7 +119,7 @@ class Lease:
     looked_at: float = math.nan
     leader: str = ""
     leader_heard: float = math.nan
-    #: Since when the leader hears fewer links than this one.
+    #: Since when the leader receives fewer links than this one.
     hears_more_since: float = math.nan
     #: The highest epoch of any claim.
     highest: int = 0
@@ -143,14 +143,14 @@ class Lease:
 
     def looked(
         self, config: LeaseConfig, now: float, link_heard: float = math.nan
-    ) -> tuple[Lease, Event | None]:
+    ) -> tuple[Lease, LeaseEvent | None]:
         """Look at the clock; what happened, if anything. link_heard: when any link was last
         heard, monotonic s; NaN: never, which says nothing."""
         overslept = now - self.looked_at > config.timeout
         lease = replace(self, looked_at=now)
         if self.role is Role.LEADING:
             if config.standby and overslept:
-                return lease._moved(Event.OVERSLEPT, now), Event.OVERSLEPT
+                return lease._moved(LeaseEvent.OVERSLEPT, now), LeaseEvent.OVERSLEPT
             return lease, None
         if overslept or now - link_heard > config.deaf_after:
             # What a leader said meanwhile is still to be read: it was not silent, we were deaf.
@@ -160,11 +160,11 @@ class Lease:
         if now < self.deadline(config):
             return lease, None
         if not math.isnan(self.hears_more_since):
-            return lease._moved(Event.HEARS_MORE, now), Event.HEARS_MORE
+            return lease._moved(LeaseEvent.HEARS_MORE, now), LeaseEvent.HEARS_MORE
         # Where nobody else was heard since, the network is gone, not the leader.
         if link_heard < self._silent_since() + self._wait(config) / 2:
             return lease, None
-        return lease._moved(Event.SILENCE, now), Event.SILENCE
+        return lease._moved(LeaseEvent.SILENCE, now), LeaseEvent.SILENCE
 
     def _wait(self, config: LeaseConfig) -> float:
         """Of several followers the first in rank takes over first."""
@@ -176,7 +176,7 @@ class Lease:
 
     def heard(
         self, config: LeaseConfig, own: Claim, other: Claim, now: float
-    ) -> tuple[Lease, Event | None]:
+    ) -> tuple[Lease, LeaseEvent | None]:
         """Another supervisor's claim came."""
         same = other.name if other.rank == config.rank else self.same_rank
         lease = replace(self, highest=max(self.highest, other.epoch), same_rank=same)
@@ -186,7 +186,7 @@ class Lease:
             # One that it has followed knows all that it knows; a reset makes that nothing.
             if other.empty and not own.empty and self.leader != other.name:
                 if own.links_heard >= other.links_heard and now >= self.stand_back_until:
-                    return lease._moved(Event.KNOWS_MORE, now), Event.KNOWS_MORE
+                    return lease._moved(LeaseEvent.KNOWS_MORE, now), LeaseEvent.KNOWS_MORE
                 if now < self.waiting_since:
                     return lease, None  # it has just begun, and may come to hear as many
             since = math.nan
@@ -195,24 +195,24 @@ class Lease:
             lease = replace(lease, leader=other.name, leader_heard=now, hears_more_since=since)
             return lease, None
         if other.strength > own.strength:
-            lease = replace(lease._moved(Event.OUTRANKED, now), leader=other.name)
-            return replace(lease, leader_heard=now), Event.OUTRANKED
+            lease = replace(lease._moved(LeaseEvent.OUTRANKED, now), leader=other.name)
+            return replace(lease, leader_heard=now), LeaseEvent.OUTRANKED
         if other.epoch > own.epoch:
             # It will yield; but devices have perhaps seen its numbers.
-            return lease, Event.OVERTAKES
+            return lease, LeaseEvent.OVERTAKES
         return lease, None
 
-    def refused(self, newest_epoch: int, now: float) -> tuple[Lease, Event]:
+    def refused(self, newest_epoch: int, now: float) -> tuple[Lease, LeaseEvent]:
         """A device has seen a higher epoch of another rank: somebody leads whom we do not hear."""
         lease = replace(self, highest=max(self.highest, newest_epoch))
-        lease = lease._moved(Event.REFUSED, now)
-        return replace(lease, stand_back_until=now + _STAND_BACK), Event.REFUSED
+        lease = lease._moved(LeaseEvent.REFUSED, now)
+        return replace(lease, stand_back_until=now + _STAND_BACK), LeaseEvent.REFUSED
 
     def next_epoch(self, config: LeaseConfig, own: int) -> int:
         """For one that takes over: above every epoch that it knows of."""
         return epoch_above(max(self.highest, own), config.rank)
 
-    def _moved(self, event: Event, now: float) -> Lease:
+    def _moved(self, event: LeaseEvent, now: float) -> Lease:
         role = after(TRANSITIONS, self.role, event)
         lease = replace(self, role=role, waiting_since=now, leader="", leader_heard=math.nan)
         return replace(lease, hears_more_since=math.nan)

@@ -10,7 +10,7 @@ from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.machine import ON_GROUND, Event, Stage
+from chute_ros.supervisor.machine import ON_GROUND, Stage, StageEvent
 from chute_ros.supervisor.preflight import RELEASED
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import pending_in, renew, slots
@@ -89,7 +89,7 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
             else:
                 # It may have erred when it said so; with nothing out, the rules must live.
                 turn.alarm(text)
-                turn.move(Event.TAKEN_BACK, text)
+                turn.move(StageEvent.TAKEN_BACK, text)
                 _unlatch_deploys(turn)
 
 

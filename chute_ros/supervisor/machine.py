@@ -27,7 +27,7 @@ class Stage(enum.IntEnum):
 ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
 
 
-class Event(enum.Enum):
+class StageEvent(enum.Enum):
     """What can move the vehicle from one stage to another."""
 
     LINKS_HEALTHY = "every required link is healthy"
@@ -46,9 +46,9 @@ class Event(enum.Enum):
     RESET = "a person asked for the start"
 
 
-_S, _E = Stage, Event
+_S, _E = Stage, StageEvent
 
-TRANSITIONS: dict[tuple[Stage, Event], Stage] = {
+TRANSITIONS: dict[tuple[Stage, StageEvent], Stage] = {
     (_S.STARTUP, _E.LINKS_HEALTHY): _S.READY,
     (_S.STARTUP, _E.LINKS_UNHEALTHY): _S.BLOCKED,
     (_S.STARTUP, _E.TAKEN_OFF): _S.IN_FLIGHT,
@@ -94,6 +94,6 @@ TRANSITIONS: dict[tuple[Stage, Event], Stage] = {
 }
 
 
-def listed(stage: Stage, event: Event) -> bool:
+def listed(stage: Stage, event: StageEvent) -> bool:
     """Does the table list this pair?"""
     return (stage, event) in TRANSITIONS

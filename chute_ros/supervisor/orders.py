@@ -8,7 +8,7 @@ from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_reached, end_kill
 from chute_ros.supervisor.gate import OPERATOR, out_already, too_low
-from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
+from chute_ros.supervisor.machine import ON_GROUND, Stage, StageEvent, listed
 from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import fire, kill_failed
@@ -93,7 +93,7 @@ def _join_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
 
 
 def _to_killing(turn: Turn, why: str) -> None:
-    if listed(turn.state.stage, Event.KILL):
+    if listed(turn.state.stage, StageEvent.KILL):
         if turn.state.stage is not Stage.KILLING:
             stood = flight.down_undisputed(turn.config, turn.state, turn.now) or flight.disarmed(
                 turn.config, turn.state, turn.now
@@ -109,7 +109,7 @@ def _to_killing(turn: Turn, why: str) -> None:
                 killed_height=readings.measured(turn.config, turn.state, "height", turn.now),
                 killed_sinking=max(sinking, 0.0),
             )
-        turn.move(Event.KILL, why)
+        turn.move(StageEvent.KILL, why)
 
 
 def _kill_under_way(turn: Turn) -> bool:

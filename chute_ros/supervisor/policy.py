@@ -25,7 +25,7 @@ _ROUNDING = 1e-6
 _NOTHING, _LATCHED = RuleEvidence(), RuleEvidence(latched=True)
 
 
-class Judged(NamedTuple):
+class JudgedRule(NamedTuple):
     """One rule as it stands now."""
 
     rule: Rule
@@ -40,7 +40,7 @@ class Judged(NamedTuple):
         return (*told, f"counter {self.evidence.level:.2f} s of {self.rule.hold:g} s")
 
 
-def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
+def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> JudgedRule:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     before = state.rule(rule.name)
     findings = tuple([condition.find(config, state, now) for condition in rule.conditions])
@@ -61,7 +61,7 @@ def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Jud
         for one in findings
     ]
     evidence = before.seeing(rule, found)
-    return Judged(rule, evidence, findings)
+    return JudgedRule(rule, evidence, findings)
 
 
 def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequence[float]:
@@ -106,7 +106,7 @@ def count_rules(turn: Turn, passed: float) -> None:
 
 def check_rules(turn: Turn) -> None:
     """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
-    fulfilled: list[Judged] = []
+    fulfilled: list[JudgedRule] = []
     stage, known = turn.state.stage, turn.state.rules
     rules = dict(known)
     rests = _vehicle_rests(turn)
@@ -168,7 +168,7 @@ def _falls_on(turn: Turn) -> bool:
     return bool(moves) and flight.in_air(turn.config, turn.state, turn.now) is not False
 
 
-def _act(turn: Turn, judged: Judged) -> None:
+def _act(turn: Turn, judged: JudgedRule) -> None:
     rule, reasons = judged.rule, judged.reasons()
     if not turn.own.leading or turn.state.mode is i.Mode.INHIBITED:
         return
@@ -186,7 +186,7 @@ def _act(turn: Turn, judged: Judged) -> None:
         turn.warn(f"{text} ({'; '.join(reasons)})")
 
 
-def _act_on_deploy(turn: Turn, judged: Judged) -> None:
+def _act_on_deploy(turn: Turn, judged: JudgedRule) -> None:
     rule, reasons, evidence = judged.rule, judged.reasons(), turn.state.rule(judged.rule.name)
     if evidence.put_off:
         denied = against_any_rule(turn.config, turn.state, turn.now)

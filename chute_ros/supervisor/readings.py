@@ -49,7 +49,7 @@ _DROP_WITHIN = 12.0
 _FELT = {FELT_DROP: felt_drop, FELT_FALL: felt_fall}
 #: What sets an estimator against others.
 _ERRORS = (SPEED_ERROR, FORCE_ERROR)
-_HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
+_HEIGHT_LOST = "the autopilot restarted in flight, and its height with it"
 
 
 def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
@@ -64,7 +64,7 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name in _FELT:
         why = unusable(config, state, ACCELERATION, now)
         felt = math.nan if why else _FELT[name](state.heard.motion)
-        return felt, why or ("too little was told lately" if math.isnan(felt) else "")
+        return felt, why or ("too little was reported lately" if math.isnan(felt) else "")
     if name in _ERRORS:
         return _error(config, state, name, now)
     known = state.measured(name)
@@ -88,7 +88,7 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     if value != state.measured(name).value:
         return ""
     if PARTS.get(name, name) in state.heard.disputed:
-        return "another source told otherwise"
+        return "another source reported otherwise"
     return state.measured(name).doubt(name, now)
 
 
@@ -207,7 +207,7 @@ def _error(config: SupervisorConfig, state: State, name: str, now: float) -> tup
     else:
         speed = measured(config, state, VERTICAL_SPEED, now)
         error = speed_error(state.heard.motion, speed, pressure_change(config, state, now))
-    return error, "too little is told at the same time" if math.isnan(error) else ""
+    return error, "too little is reported at the same time" if math.isnan(error) else ""
 
 
 def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:

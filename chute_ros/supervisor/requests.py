@@ -13,7 +13,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import give_up_waiting
 from chute_ros.supervisor.gate import OPERATOR, against_person
-from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
+from chute_ros.supervisor.machine import ON_GROUND, Stage, StageEvent, listed
 from chute_ros.supervisor.orders import note_released, order_deploy, order_kill
 from chute_ros.supervisor.pending import Ask
 from chute_ros.supervisor.preflight import arm_reasons
@@ -40,7 +40,7 @@ def arm_request(turn: Turn, one: i.ArmRequest) -> None:
 
 def arm_done(turn: Turn, one: i.ArmDone) -> None:
     """The device nodes have answered."""
-    event = Event.ARMED if one.arm else Event.DISARMED
+    event = StageEvent.ARMED if one.arm else StageEvent.DISARMED
     if one.success and listed(turn.state.stage, event):
         turn.move(event)
     if one.success:
@@ -131,11 +131,11 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
     elif in_air is None and turn.deploying.deploy_rule:
         text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
         turn.finish(one.token, False, False, text)
-    elif not listed(stage, Event.RESET):
+    elif not listed(stage, StageEvent.RESET):
         turn.finish(one.token, False, False, f"refused: the vehicle is {stage.name}")
     else:
         give_up_waiting(turn, "reset by a person")
-        turn.move(Event.RESET)
+        turn.move(StageEvent.RESET)
         turn.state = replace(
             turn.state,
             started_at=turn.now,
@@ -170,7 +170,7 @@ def mode_request(turn: Turn, one: i.ModeRequest) -> None:
         turn.deploying = replace(turn.deploying, deploys=())
         if stage is Stage.DEPLOYING:
             # What is judged anew must find a stage in which the rules live.
-            turn.move(Event.MODE_CHANGED)
+            turn.move(StageEvent.MODE_CHANGED)
         block = turn.state.block
         if block is not None and (
             block.decision.action is Action.FLIGHT_BLOCK or block.unreported()

@@ -66,7 +66,7 @@ def load(text: str, boot: str, settings: str, within: float, now: float) -> Stat
     if not isinstance(left, SavedState) or not isinstance(left.state, State):
         raise RecordError(f"nothing that was left: {text[:80]!r}")
     if left.boot != boot:
-        raise RecordError("the computer has started anew since")
+        raise RecordError("the computer has restarted since")
     if left.settings != settings:
         raise RecordError("the parameters or the profile have changed since")
     age = now - left.state.own.updated_at

@@ -92,7 +92,7 @@ def _unguarded(config: SupervisorConfig, state: State, now: float) -> list[str]:
     signs = (*FALL_SIGNS, CLIMB_RATE)
     used = {name for rule in config.profile.rules for name in rule.measured}
     if used & {*signs} and all(unusable(config, state, name, now) for name in signs):
-        told.append("nothing tells whether it falls: no vertical speed, acceleration or height")
+        told.append("nothing reports whether it falls: no vertical speed, acceleration or height")
     return told
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
-from chute_ros.supervisor.machine import TRANSITIONS, Event
+from chute_ros.supervisor.machine import TRANSITIONS, StageEvent
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import (
     Alarms,
@@ -57,7 +57,7 @@ class Turn:
         """The steps of the deploy."""
         return self.state.ladder(self.config)
 
-    def move(self, event: Event, why: str = "") -> None:
+    def move(self, event: StageEvent, why: str = "") -> None:
         """To the stage that the table names."""
         before = self.state.stage
         stage = after(TRANSITIONS, before, event)

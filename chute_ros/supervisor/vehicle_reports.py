@@ -305,7 +305,7 @@ def _note_reboots(turn: Turn, new: VehicleState, just_now: bool) -> None:
         before = new.reboot_count
     again = new.rebooted_in_flight and new.reboot_count > before
     if again and state.flight.airborne and not state.flight.rebooted:
-        turn.warn("the autopilot started anew in flight")
+        turn.warn("the autopilot restarted in flight")
     rebooted = state.flight.rebooted or (again and state.flight.airborne)
     _note_steady(turn, new, rebooted and not just_now)
     if (before, rebooted) != (state.flight.reboots_before, state.flight.rebooted):

@@ -20,7 +20,7 @@ import distributed
 from distributed import Client, as_completed, get_worker
 from distributed.worker import Worker
 
-from chute_ros.campaign.campaign import Line, fly_bundle
+from chute_ros.campaign.campaign import FlightSummary, fly_bundle
 from chute_ros.campaign.checkpoint import parts_that_fly
 from chute_ros.errors import CampaignError
 from chute_ros.ros.config_folder import config_folder
@@ -63,7 +63,7 @@ def difference(wanted: dict[str, str], dask_worker: Worker) -> str:
     return ""
 
 
-def fly_same(wanted: dict[str, str], seeds: Sequence[int]) -> list[Line]:
+def fly_same(wanted: dict[str, str], seeds: Sequence[int]) -> list[FlightSummary]:
     """Flights of a worker. CampaignError: it came after the others were compared, and differs."""
     worker = get_worker()
     if differs := difference(wanted, worker):
@@ -118,13 +118,13 @@ class Cluster:
             if differs:
                 raise CampaignError(f"worker {worker}: {differs}")
 
-    def flown(self, seeds: Sequence[int]) -> Generator[Line, None, None]:
+    def flown(self, seeds: Sequence[int]) -> Generator[FlightSummary, None, None]:
         """Flights with these seeds, in their order. A worker that dies costs its bundle again.
         CampaignError: the scheduler is gone, a worker that came later differs, or one bundle ended
         each of its workers."""
         firsts = iter(range(0, len(seeds), _BUNDLE))
         first_of: dict[object, int] = {}
-        arrived: dict[int, list[Line]] = {}
+        arrived: dict[int, list[FlightSummary]] = {}
         flying = as_completed(with_results=True, raise_errors=False, loop=self._client.loop)
 
         def send(bundles: int) -> None:

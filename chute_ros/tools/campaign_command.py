@@ -61,7 +61,7 @@ class _Flyers(NamedTuple):
     #: What the speed depends on.
     how: str
     #: The flights of seeds, in their order.
-    flown: Callable[[Sequence[int]], Generator[campaign.Line, None, None]]
+    flown: Callable[[Sequence[int]], Generator[campaign.FlightSummary, None, None]]
 
 
 def main() -> None:
@@ -187,7 +187,7 @@ def main() -> None:
         tally = kept.tally()
     except RecordError as error:
         options.error(f"argument --resume: {error}")
-    progress = _Progress(len(seeds), chosen.failures, kept, drawn)
+    progress = _CampaignProgress(len(seeds), chosen.failures, kept, drawn)
     before, took_before, broken = tally.flights, tally.took, ""
     with _flyers(chosen.scheduler, profiles, chosen.jobs, file) as flyers:
         try:
@@ -264,7 +264,7 @@ def _flyers(
     sys.exit(2)
 
 
-def _told(line: campaign.Line) -> str:
+def _told(line: campaign.FlightSummary) -> str:
     what = f"{line.vehicle}, {line.profile}, {line.failure}"
     return f"seed {line.seed}, {what}: {line.count.name}: {line.why}"
 
@@ -312,7 +312,7 @@ class _Kept:
         self._due = ended + max(_KEEP_EVERY, 19.0 * (ended - begun))
 
 
-class _Progress:
+class _CampaignProgress:
     """A line each few seconds, on the terminal's second channel, and one for each flight that must
     not be, which is saved at once: others may take hours."""
 
@@ -344,7 +344,7 @@ class _Progress:
             flush=True,
         )
 
-    def _save(self, line: campaign.Line) -> None:
+    def _save(self, line: campaign.FlightSummary) -> None:
         text = text_of(self._drawn(line.seed), f"{line.count.name}: {line.why}")
         try:
             self._failures.mkdir(parents=True, exist_ok=True)

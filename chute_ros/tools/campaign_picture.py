@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import escape
 
-from chute_ros.campaign.campaign import Line
+from chute_ros.campaign.campaign import FlightSummary
 
 #: Bars of each.
 _BARS = 60
@@ -28,16 +28,16 @@ _AXES = {
 }
 
 
-def groups_of(lines: Iterable[Line]) -> dict[str, list[Line]]:
+def groups_of(lines: Iterable[FlightSummary]) -> dict[str, list[FlightSummary]]:
     """By vehicle and profile, in a fixed order."""
-    groups: dict[str, list[Line]] = {}
+    groups: dict[str, list[FlightSummary]] = {}
     for line in sorted(lines, key=lambda one: (one.profile, one.vehicle, one.seed)):
         name = line.vehicle if line.vehicle == line.profile else f"{line.vehicle}, {line.profile}"
         groups.setdefault(name, []).append(line)
     return groups
 
 
-def picture(lines: Sequence[Line], what: str) -> str:
+def picture(lines: Sequence[FlightSummary], what: str) -> str:
     """As SVG. what: a number of a line that is known for each."""
     groups = groups_of(lines)
     height = max(1, len(groups)) * _HEIGHT

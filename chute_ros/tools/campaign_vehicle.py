@@ -13,7 +13,7 @@ from chute_ros.campaign.description import read_description
 from chute_ros.campaign.heights import WANTED, Campaign, find, own_shipped
 from chute_ros.errors import ChuteError, ProfileError
 from chute_ros.supervisor.rules import BelowMinimum, Profile
-from chute_ros.tools.heights_page import Result, heights, page, times
+from chute_ros.tools.heights_page import VehicleHeights, heights, page, times
 from chute_ros.tools.heights_picture import picture
 from chute_ros.tools.machine import machine
 from chute_ros.tools.page_file import MARKDOWN, SVG, require_output, write_page
@@ -71,7 +71,7 @@ def fly_described(options: ArgumentParser, chosen: Namespace, profiles: Path) ->
         progress = Progress(f"{campaign.vehicle.name}: flights", campaign.number)
         every = find(campaign, chosen.jobs, progress.at)
         drawn = _picture(chosen.page, file).name if chosen.page else ""
-        results.append(Result(file, campaign, every, profile, drawn))
+        results.append(VehicleHeights(file, campaign, every, profile, drawn))
         print(f"{campaign.vehicle.name}, {flights} flights of each failure:\n")
         print(f"{heights(every)}\n\n{times(results[-1].plain)}\n", flush=True)
     if chosen.page:
@@ -91,7 +91,7 @@ def _profile(campaign: Campaign) -> Profile:
     return shipped.config(vehicle.parachute, vehicle.kind, False, 0).profile
 
 
-def _write(results: Sequence[Result], path: Path, command: str, how: str) -> None:
+def _write(results: Sequence[VehicleHeights], path: Path, command: str, how: str) -> None:
     for one in results:
         allows = one.profile.below_minimum is BelowMinimum.DEPLOY
         lowest = 0.0 if allows else one.profile.minimum_height

@@ -47,7 +47,7 @@ def main() -> None:
     )
     chosen = options.parse_args()
     begun, lines, seeds, ended = time.monotonic(), [], 0, ""
-    progress = _Progress(chosen.flights)
+    progress = _ComparisonProgress(chosen.flights)
     profiles = config_folder() / "profiles"
     numbers = range(chosen.seed, chosen.seed + chosen.flights)
     try:
@@ -79,7 +79,7 @@ def main() -> None:
         sys.exit(ended)
 
 
-class _Progress:
+class _ComparisonProgress:
     """A line each few seconds, on the terminal's second channel."""
 
     def __init__(self, flights: int) -> None:

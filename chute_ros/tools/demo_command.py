@@ -16,12 +16,12 @@ from pathlib import Path
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.demo_director import Director
-from chute_ros.tools.demo_rig import FAULTS, KINDS, Rig
+from chute_ros.tools.demo_rig import FAULTS, KINDS, DemoRig
 from chute_ros.tools.demo_story import fly
 from chute_ros.tools.isolation import isolated_ros
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
-from chute_ros.tools.rocket_rig import RocketRig
+from chute_ros.tools.rocket_rig import DemoRocketRig
 from chute_ros.tools.rocket_story import RocketStory
 
 
@@ -54,10 +54,12 @@ def main() -> None:
                 fault = chosen.fault or ""
                 with contextlib.closing(Director(namespace, processes)) as director:
                     if chosen.vehicle == "rocket":
-                        rocket = RocketRig(fault, namespace, processes, Path(scratch))
+                        rocket = DemoRocketRig(fault, namespace, processes, Path(scratch))
                         RocketStory(rocket, director).fly()
                     else:
-                        drone = Rig.on_free_ports(chosen.parachute, fault, namespace, processes)
+                        drone = DemoRig.on_free_ports(
+                            chosen.parachute, fault, namespace, processes
+                        )
                         with contextlib.closing(Pilot(drone.pilot, system_id=1)) as pilot:
                             fly(drone, director, pilot)
         except ChuteError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from chute_ros.links.upf.protocol.parameters import AUTOMATIC
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.processes import Processes, ros_arguments
 
@@ -18,12 +19,10 @@ KINDS: dict[str, tuple[str, ...]] = {
 #: What --fault adds to the command line of the simulated parachute.
 FAULTS = {"parachute-silent": ("--at", "0:silent"), "parachute-mute": ("--at", "0:mute")}
 _LOCAL = "127.0.0.1"
-#: The operator arms it on the ground: nothing that would do so by itself is on.
-BY_COMMAND = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "Enable Auto-Land")
 
 
 @dataclass(frozen=True)
-class Rig:
+class DemoRig:
     """One vehicle with its nodes. kind: one of KINDS; fault: one of FAULTS, or empty."""
 
     kind: str
@@ -35,7 +34,7 @@ class Rig:
     bus_port: int
 
     @classmethod
-    def on_free_ports(cls, kind: str, fault: str, namespace: str, processes: Processes) -> Rig:
+    def on_free_ports(cls, kind: str, fault: str, namespace: str, processes: Processes) -> DemoRig:
         """With wires that nobody else uses."""
         return cls(kind, fault, namespace, processes, *free_udp_ports(3))
 
@@ -90,7 +89,8 @@ class Rig:
             wires = ("--connection", self._network, "--connection", self.pilot)
             self.processes.start("parachute", module, *wires, *fault)
         if UPF in self.links:
-            off = [*BY_COMMAND, *(() if self.automatic else ("Enable APS",))]
+            # The operator arms it on the ground: nothing that would do so by itself is on.
+            off = [*AUTOMATIC, *(() if self.automatic else ("Enable APS",))]
             parameters = [part for name in off for part in ("--parameter", f"{name}=false")]
             wires = ("--connection", self._bus, "--vehicle", self.pilot)
             module = "chute_ros.links.upf.simulator.sim_upf"

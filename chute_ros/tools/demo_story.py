@@ -10,7 +10,7 @@ from chute_ros.model import Action, Outcome, TriggerFlags, flag_names
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import Director, StepFailedError
-from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.demo_rig import DemoRig
 from chute_ros.tools.pilot import Pilot
 
 FAILURE_HEIGHT = 60.0  # m
@@ -21,7 +21,7 @@ _TAKE_OFFS, _SEEN_WITHIN = 3, 3.0
 _ARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 
 
-def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
+def fly(rig: DemoRig, director: Director, pilot: Pilot) -> None:
     """All of it; StepFailedError where a step does not happen in its time."""
     director.say("demo", f"real nodes over real wires, in {rig.namespace}, on this host only")
     rig.start_supervisor("supervisor")
@@ -37,7 +37,7 @@ def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
     _summary(director, rig)
 
 
-def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
+def _preflight(director: Director, pilot: Pilot, rig: DemoRig) -> None:
     director.until("the supervisor speaks", 20.0, lambda: bool(director.safety.links))
     director.until("the autopilot is received", 20.0, lambda: director.vehicle.armed != 0)
     director.say(
@@ -165,7 +165,7 @@ def _descend(director: Director) -> None:
     director.until("the supervisor reports deployed", 5.0, director.stage(Stage.DEPLOYED))
 
 
-def _summary(director: Director, rig: Rig) -> None:
+def _summary(director: Director, rig: DemoRig) -> None:
     """Times since the failure, and the flight as a picture."""
     steps = [
         ("kill decided", director.decision(Action.KILL)[0]),

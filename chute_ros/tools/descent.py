@@ -17,7 +17,7 @@ _FEWEST = 5
 
 
 @dataclass(frozen=True)
-class Descent:
+class MeasuredDescent:
     """fastest: sink after the release, m/s; rate: sink under the canopy, m/s, the median of the
     second half of the way down; carried_after: from the release until it sank at most a quarter
     faster than that, s; lost: height until then, m; took: from the release to the landing, s, or
@@ -30,7 +30,7 @@ class Descent:
     took: float = NAN
 
 
-def descent(vehicle: Sequence[tuple[float, VehicleState]], at: float) -> Descent:
+def descent(vehicle: Sequence[tuple[float, VehicleState]], at: float) -> MeasuredDescent:
     """After a release at this moment. vehicle: (s, what it reported), in the order of time."""
     down = []
     for when, state in vehicle:
@@ -41,12 +41,12 @@ def descent(vehicle: Sequence[tuple[float, VehicleState]], at: float) -> Descent
         if state.height_age < _FRESH and state.vertical_speed_age < _FRESH:
             down.append((when, state.height, -state.vertical_speed))
     if len(down) < 2 * _FEWEST:
-        return Descent()
+        return MeasuredDescent()
     sinks = [sink for _, _, sink in down]
     fastest, rate = max(sinks), statistics.median(sinks[len(sinks) // 2 :])
     after = down[sinks.index(fastest) :]
     carried = next((one for one in after if one[2] <= _CARRIES * rate), None)
     took = down[-1][0] - at
     if rate <= 0.0 or carried is None:
-        return Descent(fastest, rate, took=took)
-    return Descent(fastest, rate, carried[0] - at, down[0][1] - carried[1], took)
+        return MeasuredDescent(fastest, rate, took=took)
+    return MeasuredDescent(fastest, rate, carried[0] - at, down[0][1] - carried[1], took)

@@ -27,7 +27,7 @@ PROPERTIES = {
     "kill_to_deploy_delay after it, or low_kill_to_deploy_delay where the vehicle may be low",
     "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
     "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
-    "since its autopilot started anew in flight",
+    "since its autopilot restarted in flight",
     "silence": "no rule deploys unless a sign of a fall came within the last second, or a kill "
     "was decided in flight, so high and so short a time ago that it is not down yet, or is "
     "confirmed: silence and lost links alone never do",
@@ -54,7 +54,7 @@ class ViolationError(Exception):
 
 
 @dataclass(frozen=True)
-class Memory:
+class StoryMemory:
     """What the properties remember of a story. Times: monotonic s; NaN: has not happened."""
 
     kill: Decision | None = None
@@ -101,7 +101,7 @@ class Properties:
     config: SupervisorConfig
     exercised: Counter[str] = field(default_factory=Counter)
 
-    def check(self, memory: Memory, update: Update) -> Memory:
+    def check(self, memory: StoryMemory, update: Update) -> StoryMemory:
         """The memory after the update; ViolationError: a property does not hold."""
         before, after, inputs = update.before, update.after, update.inputs
         self.exercised["raises"] += 1
@@ -111,7 +111,7 @@ class Properties:
         reset = after.started_at != before.started_at
         took_off = after.stage is Stage.IN_FLIGHT and before.stage is not Stage.IN_FLIGHT
         if reset or took_off:
-            memory = Memory(newest=memory.newest)
+            memory = StoryMemory(newest=memory.newest)
         forced = any(isinstance(one, i.DeployRequest) and one.force for one in inputs)
         if forced:
             memory = replace(memory, deploy_confirmed=False)
@@ -128,7 +128,7 @@ class Properties:
             memory = self._decision(memory, update, output)
         return memory
 
-    def _taken_back(self, memory: Memory, update: Update) -> bool:
+    def _taken_back(self, memory: StoryMemory, update: Update) -> bool:
         told = [one for one in update.inputs if isinstance(one, i.ParachuteReport)]
         said = not all(one.status.deployed for one in told) and not memory.deploy_numbers
         return said and update.before.flight.airborne and update.after.stage is Stage.IN_FLIGHT
@@ -138,7 +138,7 @@ class Properties:
         if not holds:
             raise ViolationError(name, what)
 
-    def _reported(self, memory: Memory, inputs: tuple[i.Input, ...]) -> Memory:
+    def _reported(self, memory: StoryMemory, inputs: tuple[i.Input, ...]) -> StoryMemory:
         for one in inputs:
             if isinstance(one, i.ActionReport) and one.outcome is Outcome.CONFIRMED:
                 number = (one.epoch, one.id)
@@ -148,7 +148,7 @@ class Properties:
                     memory = replace(memory, deploy_confirmed=True)
         return memory
 
-    def _told_after_kill(self, memory: Memory, after: State, now: float) -> Memory:
+    def _told_after_kill(self, memory: StoryMemory, after: State, now: float) -> StoryMemory:
         """Who was not heard as it was killed may tell its height in the second after it."""
         if not now <= memory.first_killed_at + 1.0 or math.isnan(memory.kill_height):
             return memory
@@ -170,7 +170,7 @@ class Properties:
         left = [*after.kill_tokens, *after.deploy_tokens]
         self._expect("one answer", set(left) <= set(waiting), f"{left} wait of {waiting}")
 
-    def _orders(self, memory: Memory, update: Update) -> None:
+    def _orders(self, memory: StoryMemory, update: Update) -> None:
         """A rule wants a deploy: it was ordered in this update, or in SHADOW said."""
         before, after, now = update.before, update.after, update.now
         rules = {rule.name for rule in self.config.profile.rules}
@@ -228,7 +228,7 @@ class Properties:
         elif mode is i.Mode.INHIBITED:
             self._expect("inhibited", takes_back, output.decision.action.name)
 
-    def _decision(self, memory: Memory, update: Update, output: i.Decide) -> Memory:
+    def _decision(self, memory: StoryMemory, update: Update, output: i.Decide) -> StoryMemory:
         decision = output.decision
         number = (decision.epoch, decision.id)
         if not output.again:
@@ -256,7 +256,7 @@ class Properties:
             return replace(memory, deploy_numbers=numbers)
         return memory
 
-    def _killed(self, memory: Memory, update: Update, decision: Decision) -> Memory:
+    def _killed(self, memory: StoryMemory, update: Update, decision: Decision) -> StoryMemory:
         before, after, now = update.before, update.after, update.now
         number, known = (decision.epoch, decision.id), memory.kill
         again = (

@@ -20,8 +20,8 @@ from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.arguments import positive
 from chute_ros.tools.explore_properties import (
     PROPERTIES,
-    Memory,
     Properties,
+    StoryMemory,
     Update,
     ViolationError,
 )
@@ -64,7 +64,7 @@ class Node:
     """A state that was reached, and how."""
 
     state: State
-    memory: Memory
+    memory: StoryMemory
     now: float
     requests: int
     before: Node | None = None
@@ -76,7 +76,7 @@ class Node:
 
 
 @dataclass
-class Found:
+class Exploration:
     """What became of an exploration."""
 
     updates: int = 0
@@ -92,9 +92,11 @@ class Explorer:
     def __init__(self, root: Path) -> None:
         self.config, self.steps = configuration(root), steps()
         self.properties = Properties(self.config)
-        self.found = Found()
+        self.found = Exploration()
 
-    def explore(self, depth: int, beginnings: dict[str, tuple[str, ...]] = BEGINNINGS) -> Found:
+    def explore(
+        self, depth: int, beginnings: dict[str, tuple[str, ...]] = BEGINNINGS
+    ) -> Exploration:
         """Every story of up to depth steps from these beginnings."""
         try:
             front = list(map(self._begun, beginnings.values()))
@@ -107,7 +109,7 @@ class Explorer:
         return self.found
 
     def _begun(self, names: tuple[str, ...]) -> Node:
-        node = Node(State(epoch=7, started_at=START), Memory(), START, 0)
+        node = Node(State(epoch=7, started_at=START), StoryMemory(), START, 0)
         by_name = {step.name: step for step in self.steps}
         for name in names:
             after = self._taken(node, by_name[name])
@@ -154,7 +156,7 @@ class Explorer:
             raise ViolationError("raises", repr(error)) from error
 
 
-def page(found: Found, properties: Properties, depth: int, alphabet: int) -> str:
+def page(found: Exploration, properties: Properties, depth: int, alphabet: int) -> str:
     """The whole of docs/evidence/exploration.md."""
     beginnings = [f"| {name} | {', '.join(path) or 'none'} |" for name, path in BEGINNINGS.items()]
     held = [f"| {text} | {properties.exercised[name]} |" for name, text in PROPERTIES.items()]

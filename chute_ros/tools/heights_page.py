@@ -11,7 +11,7 @@ from pathlib import Path
 from chute_ros.campaign.confidence import CONFIDENCE, flights_needed
 from chute_ros.campaign.described import DescribedVehicle, Range
 from chute_ros.campaign.description import NUMBERS
-from chute_ros.campaign.heights import WANTED, Campaign, Found
+from chute_ros.campaign.heights import WANTED, Campaign, CaseFlights
 from chute_ros.campaign.needed_height import CEILING, Fall
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.tools.heights_words import ASSUMPTIONS, HOW, INTRODUCTION, WITH_FAULTS
@@ -19,22 +19,22 @@ from chute_ros.tools.pages import summary, table
 
 
 @dataclass(frozen=True)
-class Result:
+class VehicleHeights:
     """One vehicle. file: its description; picture: name of the file."""
 
     file: Path
     campaign: Campaign
-    every: Sequence[Found]
+    every: Sequence[CaseFlights]
     profile: Profile
     picture: str
 
     @property
-    def plain(self) -> list[Found]:
+    def plain(self) -> list[CaseFlights]:
         """Those without faults."""
         return [one for one in self.every if not one.case.faults]
 
 
-def page(results: Sequence[Result], command: str, how: str) -> str:
+def page(results: Sequence[VehicleHeights], command: str, how: str) -> str:
     """As Markdown. command: that wrote it; how: what its time depends on, in words."""
     lines = [
         *("# Minimum height and time of a deploy", ""),
@@ -46,7 +46,7 @@ def page(results: Sequence[Result], command: str, how: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _vehicle(result: Result) -> list[str]:
+def _vehicle(result: VehicleHeights) -> list[str]:
     vehicle = result.campaign.vehicle
     lines = [
         *(f"## {vehicle.name}", "", _in_short(result), "", f"![heights]({result.picture})", ""),
@@ -73,7 +73,7 @@ Median and 99th percentile of the flights from a usual height whose canopy carri
 opening: as above."""
 
 
-def _in_short(result: Result) -> str:
+def _in_short(result: VehicleHeights) -> str:
     saved = [one for one in result.plain if math.isfinite(one.bound)]
     lost = [one for one in result.plain if not math.isfinite(one.bound)]
     words = []
@@ -95,7 +95,7 @@ def _in_short(result: Result) -> str:
     return " ".join(words)
 
 
-def _minimum(result: Result) -> str:
+def _minimum(result: VehicleHeights) -> str:
     profile, most = result.profile, result.campaign.flights
     words = []
     if profile.minimum_height and profile.below_minimum is not BelowMinimum.DEPLOY:
@@ -114,7 +114,7 @@ def _minimum(result: Result) -> str:
     return " ".join(words)
 
 
-def heights(every: Sequence[Found]) -> str:
+def heights(every: Sequence[CaseFlights]) -> str:
     """Of each case: what it needs."""
     head = ("failure", "median", "bound", "of such failures at least")
     rows = []
@@ -139,7 +139,7 @@ _SPANS: dict[str, Callable[[Fall], float]] = {
 }
 
 
-def times(every: Sequence[Found]) -> str:
+def times(every: Sequence[CaseFlights]) -> str:
     """Of each case: how long it takes; median and 99th percentile."""
     rows = []
     for found in every:
@@ -151,7 +151,7 @@ def times(every: Sequence[Found]) -> str:
     return table(("failure", "flights", *_SPANS), rows)
 
 
-def _description(result: Result) -> str:
+def _description(result: VehicleHeights) -> str:
     vehicle = result.campaign.vehicle
     rows = [
         (f"`{key}`", _value(getattr(vehicle, key), field.unit), field.meaning)
@@ -189,12 +189,12 @@ def _value(value: float | Range, unit: str) -> str:
     return f"{value if isinstance(value, Range) else format(value, 'g')} {unit}"
 
 
-def _name(found: Found) -> str:
+def _name(found: CaseFlights) -> str:
     more = ", with faults" if found.case.faults else ""
     return f"{found.case.name}, {found.case.flown}{more}"
 
 
-def _share(found: Found) -> str:
+def _share(found: CaseFlights) -> str:
     return _percent(found.share) if math.isfinite(found.bound) else ""
 
 

@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
-from chute_ros.campaign.heights import Found
+from chute_ros.campaign.heights import CaseFlights
 
 _WIDTH, _LEFT, _RIGHT, _TOP, _ROW, _BOTTOM = 880, 210, 110, 62, 34, 44
 _BAR, _DOT = 18, 1.7
@@ -20,7 +20,7 @@ _PARTS = {
 _DOTS, _BOUND = "#1d2b3a", "#c0392b"
 
 
-def picture(every: Sequence[Found], minimum_height: float) -> str:
+def picture(every: Sequence[CaseFlights], minimum_height: float) -> str:
     """As SVG, a row for each failure. minimum_height: of the rules, m; 0: they have none."""
     most = max((h for one in every for h in one.needed if math.isfinite(h)), default=0.0)
     tick = next(step for step in (5, 10, 20, 50) if most <= 10 * step)
@@ -72,7 +72,7 @@ def _axis(tick: int, most: float, scale: float, floor: float) -> list[str]:
     return parts
 
 
-def _row(found: Found, scale: float, top: float) -> list[str]:
+def _row(found: CaseFlights, scale: float, top: float) -> list[str]:
     case, middle = found.case, top + _ROW / 2.0
     name = f"{case.name}, {case.flown}"
     parts = [f'<text x="{_LEFT - 8}" y="{middle + 4}" text-anchor="end">{escape(name)}</text>']
@@ -101,7 +101,7 @@ def _row(found: Found, scale: float, top: float) -> list[str]:
     return parts
 
 
-def _lost(found: Found) -> list[float]:
+def _lost(found: CaseFlights) -> list[float]:
     """The height that each part takes, m, in the mean of the flights from the least height."""
     parts = zip(*(fall.parts for fall in found.lowest), strict=True)
     return [statistics.mean(values) for values in parts] or [0.0] * len(_PARTS)

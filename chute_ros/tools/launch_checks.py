@@ -120,7 +120,7 @@ def check_port(text: str) -> int:
 
 
 @dataclass(frozen=True)
-class Flight:
+class FlightArguments:
     """What a simulated vehicle is to do by itself, as given; empty: nothing of the kind.
 
     fly: height to which it takes off, m; launch: how long after the start a rocket launches, s;

@@ -17,21 +17,21 @@ from chute_ros.transport.regular_file import open_regular
 _HEAD = 500
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file: its name, and how it begins."""
 
     name: str
     begins: re.Pattern[bytes]
 
 
-HTML = Kind("HTML page", re.compile(rb"<!DOCTYPE html>"))
-SVG = Kind("SVG picture", re.compile(rb"(<\?xml [^>]*>\s*)?<svg "))
+HTML = FileKind("HTML page", re.compile(rb"<!DOCTYPE html>"))
+SVG = FileKind("SVG picture", re.compile(rb"(<\?xml [^>]*>\s*)?<svg "))
 #: A title alone: parameter files begin with a comment of several lines.
-MARKDOWN = Kind("Markdown page", re.compile(rb"# [^\n]+\n\n"))
-JUNIT = Kind("JUnit report", re.compile(rb"(<\?xml [^>]*>\s*)?<testsuite"))
+MARKDOWN = FileKind("Markdown page", re.compile(rb"# [^\n]+\n\n"))
+JUNIT = FileKind("JUnit report", re.compile(rb"(<\?xml [^>]*>\s*)?<testsuite"))
 
 
-def require_output(path: Path, kind: Kind, inputs: Iterable[Path] = ()) -> None:
+def require_output(path: Path, kind: FileKind, inputs: Iterable[Path] = ()) -> None:
     """ChuteError, in one line, where write_page would raise it now."""
     try:
         existing = _existing(path, kind, inputs)
@@ -42,12 +42,12 @@ def require_output(path: Path, kind: Kind, inputs: Iterable[Path] = ()) -> None:
         raise _refused(path, error) from None
 
 
-def write_page(path: Path, text: str, kind: Kind, inputs: Iterable[Path] = ()) -> None:
+def write_page(path: Path, text: str, kind: FileKind, inputs: Iterable[Path] = ()) -> None:
     """write_output of a text, in UTF-8."""
     write_output(path, text.encode("utf-8"), kind, inputs)
 
 
-def write_output(path: Path, data: bytes, kind: Kind, inputs: Iterable[Path] = ()) -> None:
+def write_output(path: Path, data: bytes, kind: FileKind, inputs: Iterable[Path] = ()) -> None:
     """Write data to path: whole, or what was there stays. ChuteError, in one line: it cannot be
     written, is one of inputs, or is there and is no earlier output of this kind."""
     assert kind.begins.match(data), f"no {kind.name}"  # the next one could not go over it
@@ -63,7 +63,7 @@ def write_output(path: Path, data: bytes, kind: Kind, inputs: Iterable[Path] = (
         raise _refused(path, error) from None
 
 
-def _existing(path: Path, kind: Kind, inputs: Iterable[Path]) -> os.stat_result | None:
+def _existing(path: Path, kind: FileKind, inputs: Iterable[Path]) -> os.stat_result | None:
     """What is there; None: nothing."""
     try:
         about = path.stat()

@@ -11,8 +11,8 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from chute_ros.plain_text import plain
-from chute_ros.ros import messages, qos
-from chute_ros.tools.chute.order import Answer
+from chute_ros.ros import messages, person_requests, qos
+from chute_ros.tools.chute.order import ServiceAnswer
 
 #: A process that ends after its order waits no longer for the record to take the answer, s.
 _LEFT_WITHIN = 0.5
@@ -39,11 +39,8 @@ class PersonRecord:
         return RecordedOrder(self, told)
 
     def publish(self, told: PersonRequest) -> None:
-        """Whatever keeps a record must not keep an order from being sent."""
-        try:
-            self._publisher.publish(told)
-        except Exception as error:  # noqa: BLE001
-            self._node.get_logger().error(f"{told.service} is not in the record: {error}")
+        """As far as that can be."""
+        person_requests.publish(self._node, self._publisher, told)
 
     def leave(self) -> None:
         """What was published is received, or nobody does: the process may end."""
@@ -57,7 +54,7 @@ class RecordedOrder:
         self._record, self.told = record, told
         self._called = time.monotonic()
 
-    def answered(self, answer: Answer) -> None:
+    def answered(self, answer: ServiceAnswer) -> None:
         """Its answer, published as well."""
         self.told.answered, self.told.success = True, answer.success
         self.told.accepted, self.told.message = bool(answer.accepted), answer.message

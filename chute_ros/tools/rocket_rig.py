@@ -14,7 +14,7 @@ SPEED = 10.0
 
 
 @dataclass(frozen=True)
-class RocketRig:
+class DemoRocketRig:
     """One rocket with its nodes. fault: one of FAULTS, or empty; folder: where the port is;
     profile: of its supervisor."""
 

@@ -12,7 +12,7 @@ from chute_ros.model import Action, Outcome
 from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import Director, StepFailedError
-from chute_ros.tools.rocket_rig import SPEED, UMBILICAL, RocketRig
+from chute_ros.tools.rocket_rig import SPEED, UMBILICAL, DemoRocketRig
 
 #: The operator presses the button when it falls faster than this, m/s.
 OPERATOR_SINK = -30.0
@@ -23,7 +23,7 @@ LANDING_SINK = -8.0
 class RocketStory:
     """Sees the telemetry beside what the director sees."""
 
-    def __init__(self, rig: RocketRig, director: Director) -> None:
+    def __init__(self, rig: DemoRocketRig, director: Director) -> None:
         self.rig, self.director = rig, director
         self.telem = Telem(flight_mode=Telem.FLIGHT_MODE_UNKNOWN)
         self.apogee = 0.0

@@ -40,7 +40,7 @@ from chute_ros.tools.bench_call import call_action
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
-from chute_ros.tools.launch_checks import Flight
+from chute_ros.tools.launch_checks import FlightArguments
 from chute_ros.tools.processes import Processes, ros_arguments
 from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
 
@@ -215,7 +215,7 @@ def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> No
         told = {name: json.dumps(value) for name, value in given.items()}
         processes.start(node, module_of(node), *ros_arguments(chosen.namespace, **told))
     modules = {one.name: one.module for one in entry_points(group="console_scripts")}
-    flight = Flight().options(simulators_of(vehicle.name))
+    flight = FlightArguments().options(simulators_of(vehicle.name))
     for _, (simulator, *arguments) in vehicle.simulators():
         processes.start(simulator, modules[simulator], *arguments, *flight.get(simulator, ()))
     bench = ros_arguments(chosen.namespace, vehicle=vehicle.name, folder=folder)

@@ -42,9 +42,9 @@ def states_text() -> str:
     """The whole of docs/reference/states.md."""
     parts = [
         _HEAD,
-        _table(machine.Event, machine.TRANSITIONS),
+        _table(machine.StageEvent, machine.TRANSITIONS),
         _LEASE,
-        _table(lease.Event, lease.TRANSITIONS),
+        _table(lease.LeaseEvent, lease.TRANSITIONS),
     ]
     return "\n".join(parts)
 

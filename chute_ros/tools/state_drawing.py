@@ -10,7 +10,7 @@ import itertools
 import math
 from xml.sax.saxutils import escape
 
-from chute_ros.supervisor.machine import ON_GROUND, TRANSITIONS, Event, Stage
+from chute_ros.supervisor.machine import ON_GROUND, TRANSITIONS, Stage, StageEvent
 
 Point = tuple[float, float]
 
@@ -81,7 +81,7 @@ def drawing() -> str:
     inside: dict[Stage, list[str]] = {}
     between: dict[tuple[Stage, Stage], list[str]] = {}
     for (before, event), after in TRANSITIONS.items():
-        if event is Event.RESET or before is after:
+        if event is StageEvent.RESET or before is after:
             where = "stays" if before is after else f"to {after.name}"
             inside.setdefault(before, []).append(f"{event.name}: {where}")
         elif not (before in ON_GROUND and event.name in common.get(after, [])):
@@ -97,7 +97,7 @@ def drawing() -> str:
 def _common() -> dict[Stage, list[str]]:
     """Stage -> the stimuli that lead there from every stage on the ground."""
     found: dict[Stage, list[str]] = {}
-    for event in Event:
+    for event in StageEvent:
         afters = {TRANSITIONS.get((stage, event)) for stage in ON_GROUND}
         after = afters.pop()
         if not afters and after is not None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from chute_ros.ros.middleware_diagnostics import TASK, VERSION
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
-from chute_ros.tools.descent import Descent, descent
+from chute_ros.tools.descent import MeasuredDescent, descent
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.recording import Recording, utc
 from chute_ros.tools.release_orders import Release
@@ -137,7 +137,7 @@ def _descents(story: FlightStory, released: Sequence[Release]) -> str:
     )
 
 
-def _of(found: Descent) -> tuple[float, ...]:
+def _of(found: MeasuredDescent) -> tuple[float, ...]:
     return found.fastest, found.rate, found.carried_after, found.lost, found.took
 
 

@@ -34,7 +34,7 @@ def main() -> None:
     made = make_each("to_rosbag2", given, "one folder", _convert)
     if made:
         _tell(
-            "play where no vehicle hears it: a recorded request or heartbeat is one to every "
+            "play where no vehicle receives it: a recorded request or heartbeat is one to every "
             "node in the same domain"
         )
     sys.exit(0 if made else 2)

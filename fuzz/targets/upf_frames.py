@@ -10,7 +10,7 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.data_types import DataType, DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import MOST_SESSIONS, Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import MOST_SESSIONS, Transfer, TransferKind, frames_of
 from chute_ros.transport.data_types import load_data_types
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
@@ -46,23 +46,23 @@ def data_types() -> DataTypes:
 
 
 @functools.cache
-def kinds() -> tuple[tuple[Kind, DataType], ...]:
+def kinds() -> tuple[tuple[TransferKind, DataType], ...]:
     """All of them, with their directions; those of NAMES first."""
     types = data_types()
     found = []
     for name in NAMES:
-        for kind in Kind:
+        for kind in TransferKind:
             one = types.find(name, kind.value)
             found += [(kind, one)] if one is not None else []
     known = {one.name for _, one in found}
-    for kind in Kind:
-        for number in range(0x10000 if kind is Kind.MESSAGE else 0x100):
+    for kind in TransferKind:
+        for number in range(0x10000 if kind is TransferKind.MESSAGE else 0x100):
             one = types.by_id(number, kind.value)
             found += [(kind, one)] if one is not None and one.name not in known else []
     return tuple(found)
 
 
-def transfer_of(p: Program) -> tuple[list[bytes], Kind, DataType]:
+def transfer_of(p: Program) -> tuple[list[bytes], TransferKind, DataType]:
     """The frames of a good transfer, of a payload that is any bytes."""
     how = p.byte()
     few = 2 * len(NAMES) - len([one for one in NAMES if data_types().find(one, None)])
@@ -71,7 +71,7 @@ def transfer_of(p: Program) -> tuple[list[bytes], Kind, DataType]:
     if how & 2:
         payload = payload.ljust(len(data_type.encode({})), b"\0")
     source = p.choice((CONTROLLER, TRIGGER)) if how & 4 else p.byte() % 128
-    service = kind is not Kind.MESSAGE
+    service = kind is not TransferKind.MESSAGE
     number, priority = p.byte() % 32, p.byte() % 32
     transfer = Transfer(
         kind, data_type.id, source, US if service else 0, number, payload, priority
@@ -122,7 +122,7 @@ class Transfers:
             else:
                 self._spoilt(frames, program)
 
-    def _whole(self, frames: list[bytes], kind: Kind, data_type: DataType) -> None:
+    def _whole(self, frames: list[bytes], kind: TransferKind, data_type: DataType) -> None:
         before = sum(self._endpoint.counts.values())
         heard = [self._endpoint.receive(frame, self._now) for frame in frames]
         counted = sum(self._endpoint.counts.values()) - before

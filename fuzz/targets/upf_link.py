@@ -17,8 +17,8 @@ from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.transfer import (
     TRANSFER_IDS,
     Assembler,
-    Kind,
     Transfer,
+    TransferKind,
     frames_of,
 )
 from fuzz.program import Program
@@ -93,7 +93,7 @@ class UpfLinked(Linked):
             values = {"uptime_sec": p.byte(), "health": p.byte() % 4}
         kind = data_types().message(name)
         payload = kind.encode(self._definitions.present(name, values))
-        self._deliver(Transfer(Kind.MESSAGE, kind.id, node, 0, p.byte() % 32, payload))
+        self._deliver(Transfer(TransferKind.MESSAGE, kind.id, node, 0, p.byte() % 32, payload))
 
     def _answer(self, p: Program) -> None:
         """A device answers one of the newest requests, with any payload or a small number."""
@@ -102,7 +102,7 @@ class UpfLinked(Linked):
         asked = p.choice(self._asked)
         payload = p.piece() if p.flag() else bytes((p.byte() % 8,))
         answer = Transfer(
-            Kind.RESPONSE, asked.type_id, asked.destination, US, asked.transfer_id, payload
+            TransferKind.RESPONSE, asked.type_id, asked.destination, US, asked.transfer_id, payload
         )
         self._deliver(answer)
 
@@ -212,9 +212,9 @@ class UpfLinked(Linked):
         values = kind.decode(came.payload)
         if values is None:
             raise WrongError(f"a {kind.name} left that cannot be read: {came}")
-        if came.kind is Kind.REQUEST:
+        if came.kind is TransferKind.REQUEST:
             self._asked = [*self._asked, came][-4:]
-        if came.kind is not Kind.RESPONSE:
+        if came.kind is not TransferKind.RESPONSE:
             self._check(kind.name, values)
 
     def _check(self, name: str, values: Mapping[str, Any]) -> None:

@@ -127,7 +127,7 @@ def test_a_standby_takes_over_from_one_that_stops(dies: bool) -> None:
     stop = Stop("supervisor", 0.9, 8.0, dies=dies)
     end = flown(Failure.MOTOR, stop, height=100.0, standby=True)
     assert judge(end).count is Count.CORRECT
-    takes_over = "became leader, epoch 17: no leader was heard for the lease's time"
+    takes_over = "became leader, epoch 17: no leader's heartbeat was received for the lease's time"
     assert takes_over in [text for _, text in end.said]
     # Before the one that stopped is back.
     assert end.released < end.up + 3.0

@@ -11,13 +11,13 @@ from campaign_bench import FOLDER
 
 from chute_ros.campaign.cases import Case, cases, flight_of
 from chute_ros.campaign.described import DescribedVehicle, OwnShipped, Range
-from chute_ros.campaign.heights import Campaign, Found, find, fly
+from chute_ros.campaign.heights import Campaign, CaseFlights, find, fly
 from chute_ros.campaign.needed_height import (
     CEILING,
     Fall,
+    FallStage,
     Needed,
     ObservedFlight,
-    Stage,
     needed_height,
 )
 from chute_ros.campaign.scenario import Failure
@@ -35,12 +35,12 @@ SOFT = 6.0
 
 def saved(height: float, lost: float) -> Fall:
     """Its canopy carried after so many m."""
-    return Fall(height, Stage(0.5, 1.0), Stage(0.6, 1.5), Stage(2.0, lost), math.nan)
+    return Fall(height, FallStage(0.5, 1.0), FallStage(0.6, 1.5), FallStage(2.0, lost), math.nan)
 
 
 def crashed(height: float) -> Fall:
     """Its canopy was still opening."""
-    return Fall(height, Stage(0.5, 1.0), Stage(0.6, 1.5), Stage(), 15.0)
+    return Fall(height, FallStage(0.5, 1.0), FallStage(0.6, 1.5), FallStage(), 15.0)
 
 
 class World:
@@ -83,7 +83,7 @@ def test_what_is_saved_from_nowhere_needs_more_than_any_height() -> None:
 
 
 def test_what_lands_softly_without_a_parachute_needs_no_height() -> None:
-    glides = Fall(80.0, Stage(), Stage(), Stage(), 2.5)
+    glides = Fall(80.0, FallStage(), FallStage(), FallStage(), 2.5)
     assert needed_height(lambda height: glides, SOFT, 1).height == 0.0
 
 
@@ -95,10 +95,12 @@ def test_a_touchdown_under_a_canopy_that_is_still_opening_counts_if_it_is_soft()
 # What is counted
 
 
-def found(*every: float) -> Found:
+def found(*every: float) -> CaseFlights:
     """Of flights that need these heights."""
     case = Case("a failure", "it fails", Failure.MOTOR)
-    return Found(case, tuple(Needed(n, h, saved(80.0, h), h < 80.0) for n, h in enumerate(every)))
+    return CaseFlights(
+        case, tuple(Needed(n, h, saved(80.0, h), h < 80.0) for n, h in enumerate(every))
+    )
 
 
 def test_few_flights_bound_a_smaller_share_by_their_largest() -> None:
@@ -115,8 +117,8 @@ def test_one_that_is_never_saved_is_the_largest() -> None:
 
 
 def test_one_that_was_released_before_its_failure_is_no_such_flight() -> None:
-    before = Fall(math.nan, Stage(), Stage(), Stage(), math.nan, ended_before=True)
-    one = Found(found(5.0).case, (*found(5.0, 6.0).every, Needed(9, 0.0, before, True)))
+    before = Fall(math.nan, FallStage(), FallStage(), FallStage(), math.nan, ended_before=True)
+    one = CaseFlights(found(5.0).case, (*found(5.0, 6.0).every, Needed(9, 0.0, before, True)))
     assert one.needed == [5.0, 6.0]
 
 

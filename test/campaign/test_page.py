@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.campaign.campaign import Line, Tally
+from chute_ros.campaign.campaign import FlightSummary, Tally
 from chute_ros.campaign.checkpoint import tally_of, text_of
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.scenario import Failure
@@ -17,7 +17,7 @@ def flights(*every: tuple[Failure, Count, str]) -> Tally:
     tally = Tally(took=3.0 * len(every))
     for seed, (failure, count, second) in enumerate(every):
         who = (seed, "mavlink", "multirotor", failure.value)
-        tally.add(Line(*who, count, "for a test", 1.5, 4.0, (), second))
+        tally.add(FlightSummary(*who, count, "for a test", 1.5, 4.0, (), second))
     return tally
 
 

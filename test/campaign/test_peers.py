@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from chute_ros.campaign.peers.api import Belief, Order, Peer
+from chute_ros.campaign.peers.api import Belief, Peer, PeerDecision
 from chute_ros.campaign.peers.arducopter import ArduCopter
 from chute_ros.campaign.peers.arduplane import ArduPlane
 from chute_ros.campaign.peers.px4 import Px4
@@ -37,7 +37,7 @@ HOVER = Belief(
 Course = Callable[[float], dict[str, float]]
 
 
-def first(peer: Peer, course: Course, lasts: float = 6.0) -> tuple[float, Order] | None:
+def first(peer: Peer, course: Course, lasts: float = 6.0) -> tuple[float, PeerDecision] | None:
     """When the peer orders something, s after the begin of the course, and what."""
     for number in range(100):
         assert peer.step(replace(HOVER, now=number * STEP)) is None, "in a hover"

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chute_ros.campaign.bus import spoil_can
-from chute_ros.campaign.channel import Channel, Nature, Spell
+from chute_ros.campaign.channel import Channel, Delivery, Spell
 from chute_ros.campaign.world import World
 from chute_ros.sim.faults import flip_a_byte
 
@@ -87,8 +87,8 @@ def sent(messages: int, every: float, in_order: bool = True, **spell: float) -> 
     """(number, arrival) of messages sent at these intervals from 0 on; they take 1 ms."""
     world, arrived = World(), []
     spells = [Spell(0.0, **{"end": math.inf, **spell})]
-    nature = Nature(0.001, in_order, overtaken=0.05)
-    channel: Channel[int] = Channel(world, "4", nature, (spells, []))
+    delivery = Delivery(0.001, in_order, overtaken=0.05)
+    channel: Channel[int] = Channel(world, "4", delivery, (spells, []))
     for number in range(messages):
         world.post(
             number * every,

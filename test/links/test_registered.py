@@ -15,7 +15,7 @@ import pytest
 from chute_ros.campaign.scenario import part
 from chute_ros.errors import NotRegisteredError
 from chute_ros.links import api, registered
-from chute_ros.links.api import BlockingLink, Link, LinkKind, load
+from chute_ros.links.api import Link, LinkKind, load
 from chute_ros.links.registered import links, module_of, vehicles
 from chute_ros.runtime.device import DeviceRuntime
 
@@ -53,11 +53,14 @@ def test_its_protocol_is_a_link(folder):
         for one in runtimes
         if inspect.isclass(one) and issubclass(one, DeviceRuntime) and one is not DeviceRuntime
     ]
-    kind = BlockingLink if runtime.BLOCKS_FLIGHT else Link
-    for name, wanted in inspect.getmembers(kind, inspect.isfunction):
-        if name.startswith("_"):
-            continue
-        takes = list(inspect.signature(wanted).parameters)
+    wanted = {
+        name: list(inspect.signature(one).parameters)
+        for name, one in inspect.getmembers(Link, inspect.isfunction)
+        if not name.startswith("_")
+    }
+    if runtime.BLOCKS_FLIGHT:
+        wanted["flight_block"] = ["self", "reason", "now"]
+    for name, takes in wanted.items():
         has = list(inspect.signature(getattr(made, name)).parameters)
         assert has[: len(takes)] == takes, f"{made.__name__}.{name}"
 

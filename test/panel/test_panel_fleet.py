@@ -10,7 +10,7 @@ from heard_vehicle import NOW, WALL, stamped
 from test_panel_parts import HOSTILE, text_of
 
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.chute.hearing import Heard
+from chute_ros.tools.chute.hearing import ReceivedMessage
 from chute_ros.tools.panel.fleet import age_of, fleet, link_to
 
 
@@ -19,7 +19,7 @@ def summary(stage, at=0.0, number=2, **fields):
     message = SafetySummary(
         state=int(stage), state_name=stage.name, text=stage.name, links_ok=2, links=2, **fields
     )
-    return Heard(stamped(message, at), NOW + at, WALL + at, number)
+    return ReceivedMessage(stamped(message, at), NOW + at, WALL + at, number)
 
 
 def order(**those):
@@ -72,11 +72,11 @@ def test_one_that_is_silent_is_not_shown_as_if_it_were_now():
 
 
 def test_the_first_word_is_latched_and_may_be_hours_old():
-    hours = Heard(stamped(summary(Stage.READY).message, -7200.0), NOW, WALL, 1)
+    hours = ReceivedMessage(stamped(summary(Stage.READY).message, -7200.0), NOW, WALL, 1)
     assert age_of(hours, NOW + 1.0) == pytest.approx(7201.0)
     assert "NOT KNOWN NOW" in fleet([("/a", hours)], NOW)
     # The second one is of now, whatever the sender's clock says.
-    second = Heard(hours.message, NOW, WALL, 2)
+    second = ReceivedMessage(hours.message, NOW, WALL, 2)
     assert age_of(second, NOW + 1.0) == pytest.approx(1.0)
 
 

@@ -26,7 +26,7 @@ from panel_bench import (
 )
 from playwright.sync_api import expect
 
-from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.demo_rig import DemoRig
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
 
@@ -41,7 +41,7 @@ def hangar(request, namespace, tmp_path):
     folder = tmp_path / "vehicle"
     folder.mkdir()
     processes = Processes(folder)
-    yield Rig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
+    yield DemoRig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
     processes.end()
 
 

@@ -61,7 +61,7 @@ def test_a_mode_that_does_not_fire_stands_out_and_so_does_an_alarm():
 
 def test_a_vehicle_that_nobody_guards_is_no_calm_flight():
     why = "no parachute can be reached: mavlink_parachute is LOST"
-    alarms = ["rule 'link lost' warns: a device is not heard", why]
+    alarms = ["rule 'link lost' warns: nothing is received from a device", why]
     part = sections.banner(shown(state_text=f"IN_FLIGHT, NOT GUARDED: {why}", alarms=alarms))
     assert "tone-bad" in part
     # Each is told once.
@@ -130,7 +130,7 @@ def test_a_parachute_that_is_silent_is_grey():
 @pytest.mark.parametrize(
     ("date", "told"),
     [
-        ("", "packed not told"),
+        ("", "packed not reported"),
         ("2026-07-01", "2026-07-01, 0 days ago"),
         ("2026-07-03", "2026-07-03, in 2 days: one of the two clocks is wrong"),
         ("soon", "packed soon"),
@@ -303,8 +303,8 @@ def test_a_rocket_with_its_valves_and_its_memory():
     memory = Task("rocket/umbilical: memory", "OK", "no dump", {"newest progress": "done"}, 0.1)
     assert text_of(rocket(telem, 0.2, [memory])) == (
         "Rocket key ARMED flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid "
-        "valve OPEN main valve closed drogue DEPLOYED main parachute not told air brake deployed, "
-        "25 % open "
+        "valve OPEN main valve closed drogue DEPLOYED main parachute not reported air brake "
+        "deployed, 25 % open "
         "satellites 9 BLiMS target 320 m at 45 ° telemetry telem57, <1 s ago "
         "memory no dump (done), <1 s ago"
     )
@@ -325,7 +325,7 @@ def test_what_a_rocket_does_not_tell_is_not_told():
         blims_dist_to_target=math.nan,
     )
     part = text_of(rocket(nothing, math.nan, []))
-    assert part.count("not told") == 8
+    assert part.count("not reported") == 8
     assert part.count("not known") == 2
     assert "never received" in part
 
@@ -336,8 +336,8 @@ def test_what_a_rocket_does_not_tell_is_not_told():
         (Telem.STARTUP, "key not armed"),
         (Telem.STANDBY, "key ARMED"),
         (Telem.COAST, "key ARMED"),
-        (Telem.FAULT, "key not told"),
-        (255, "key not told"),
+        (Telem.FAULT, "key not reported"),
+        (255, "key not reported"),
     ],
 )
 def test_of_the_key_is_said_what_the_mode_tells(mode, told):

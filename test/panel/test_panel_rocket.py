@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from rocket_operator import commands_to
 
 from chute_ros.tools.processes import Processes
-from chute_ros.tools.rocket_rig import RocketRig
+from chute_ros.tools.rocket_rig import DemoRocketRig
 
 # One browser at a time: it takes a core of its own.
 pytestmark = pytest.mark.xdist_group("browser")
@@ -22,7 +22,7 @@ def rig(namespace, tmp_path):
     folder = tmp_path / "rocket"
     folder.mkdir()
     processes = Processes(folder)
-    one = RocketRig("", namespace, processes, folder)
+    one = DemoRocketRig("", namespace, processes, folder)
     one.start_ground()
     yield one
     processes.end()

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import LinkState
-from chute_ros.protocol.liveness import TRANSITIONS, Event, Liveness, LivenessLimits
+from chute_ros.protocol.liveness import TRANSITIONS, Liveness, LivenessEvent, LivenessLimits
 from chute_ros.transitions import after
 
 LIMITS = LivenessLimits(stale_after=2.5, lost_after=5.0)
 
 
 def test_a_pair_is_in_the_table_or_raises():
-    for state, event in itertools.product(LinkState, Event):
+    for state, event in itertools.product(LinkState, LivenessEvent):
         if (state, event) in TRANSITIONS:
             assert after(TRANSITIONS, state, event) is TRANSITIONS[state, event]
         else:

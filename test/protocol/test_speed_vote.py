@@ -72,7 +72,7 @@ def test_an_estimate_that_hovers_on_is_outvoted_by_barometer_and_odometry():
     assert math.isnan(state.attitude_error), "how far it is from its command, nobody else knows"
     assert "vertical_speed" not in disputed
     (why,) = (one for one in state.faults if "origins" in one)
-    assert why.startswith("vehicle/state tells a vertical speed of ")
+    assert why.startswith("vehicle/state reports a vertical speed of ")
     assert "odometry -1" in why
     assert "the barometer -1" in why
 
@@ -87,7 +87,7 @@ def test_an_odometry_that_falls_beside_a_barometer_that_does_not_is_outvoted():
     assert abs(state.vertical_speed) < 0.5
     assert state.tilt < 0.1
     assert "vertical_speed" not in disputed, "the one that is right is in no doubt any more"
-    assert any(one.startswith("odometry tells a vertical speed") for one in state.faults)
+    assert any(one.startswith("odometry reports a vertical speed") for one in state.faults)
 
 
 def test_without_a_barometer_nobody_knows_who_is_right():

@@ -175,3 +175,12 @@ def stamped(node: Node, message: Any, age: float = 0.0) -> Any:
     nanoseconds = time.time_ns() - int(age * 1e9)
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
     return message
+
+
+def newest(messages: list[Any], **fields: Any) -> Callable[[], Any]:
+    """A condition: the newest message has these fields."""
+    return lambda: (
+        messages
+        and all(getattr(messages[-1], name) == value for name, value in fields.items())
+        and messages[-1]
+    )

@@ -61,7 +61,7 @@ def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() 
     text = "IN_FLIGHT: attitude in doubt, as the vehicle's sources contradict each other"
     assert text in task.message
     assert values(task)["sources contradict each other"] == "attitude"
-    assert values(task)["tilt_deg"] == "90.00 (in doubt: another source told otherwise)"
+    assert values(task)["tilt_deg"] == "90.00 (in doubt: another source reported otherwise)"
     told = safety_told(CONFIG, "", state, {}, NOW)
     assert text in state_message(CONFIG, told, Time()).state_text
 

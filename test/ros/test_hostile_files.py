@@ -12,7 +12,7 @@ from chute_ros.links.mavlink.signing_memory import SigningMemory
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.upf.allocation_file import AllocationFile
 from chute_ros.ros.profile_files import load_profile
-from chute_ros.ros.supervisor_memory import Memory
+from chute_ros.ros.supervisor_memory import SupervisorMemory
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.transport import regular_file
 from chute_ros.transport.data_types import load_data_types
@@ -131,7 +131,7 @@ def test_the_times_of_signing_begin_anew_and_are_kept_in_its_place(tmp_path, nod
 @hostile
 def test_the_memory_of_a_supervisor_starts_fresh(tmp_path, node, kind):
     path = put(kind, tmp_path / "chute_ros" / "resume" / "a.node@7.json")
-    memory = Memory(node, {"resume_within": 30.0}, SupervisorConfig())
+    memory = SupervisorMemory(node, {"resume_within": 30.0}, SupervisorConfig())
     try:
         assert ends(memory.recall) is None
         (said,) = node.said

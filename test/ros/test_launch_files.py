@@ -14,7 +14,7 @@ from launch_files import LAUNCH, Recorded, loaded, made_by
 
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
-from chute_ros.links.upf.protocol.parameters import EXCLUDES
+from chute_ros.links.upf.protocol.parameters import AUTOMATIC
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.sim_upf import _parameters
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
@@ -187,7 +187,7 @@ def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
     (upf,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_upf"]
     given = [after for before, after in itertools.pairwise(upf) if before == "--parameter"]
     values = {**CONTROLLER_PARAMETERS, **_parameters(given)}
-    assert [name for name in EXCLUDES.values() if values[name]] == []
+    assert [name for name in AUTOMATIC if values[name]] == []
 
 
 def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(

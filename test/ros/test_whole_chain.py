@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 from chute_msgs.msg import ParachuteStatus, SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy
-from mavlink_bench import Autopilot, Module, do, quick
+from mavlink_bench import Autopilot, ChainFlight, Module, do, quick
 from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import DeploymentTrigger
-from chute_ros.ros import qos
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.sim.faults import FaultKnobs
 
@@ -20,12 +19,12 @@ NO_FAULTS = FaultKnobs()
 HEIGHT = 20.0
 
 
-class Flight:
+class Flight(ChainFlight):
     """One vehicle, from the ground up."""
 
     def __init__(self, bench, knobs=NO_FAULTS, height=HEIGHT, profile="by_hand", **parameters):
-        self.bench, self.knobs, self.height = bench, knobs, height
-        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        super().__init__(bench)
+        self.knobs, self.height = knobs, height
         self.vehicle = bench.follow(VehicleState, "vehicle/state")
         self.parachute = bench.follow(ParachuteStatus, "parachute/status")
         bench.add(SafetySupervisorNode, startup_grace=0.5, profile=profile)
@@ -41,14 +40,6 @@ class Flight:
     def plug_parachute_in(self):
         vehicle = f"udpout:{LOCAL}:{port_of(self.autopilot.loop)}"
         self.bench.simulate(self.module, self.network, vehicle, knobs=self.knobs)
-
-    def act(self, action):
-        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
-
-    def await_stage(self, *stages):
-        self.bench.until(
-            lambda: self.safety and self.safety[-1].state in stages, f"the stage is {stages}"
-        )
 
     def await_vehicle(self, what, condition):
         self.bench.until(lambda: self.vehicle and condition(self.vehicle[-1]), what)

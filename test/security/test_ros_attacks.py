@@ -69,7 +69,7 @@ def test_a_recorded_decision_fires_nothing_later(bench, heard, say):
     say(epoch=5, id=4, targets=["upf_can"])
     counted(bench, "addressed to others", 1)
     say(epoch=5, id=4, shadow=True)
-    counted(bench, "shadow: only said, not done", 1)
+    counted(bench, "shadow: only reported, not done", 1)
     assert len(heard.releases) == fired
 
 

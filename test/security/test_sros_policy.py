@@ -22,13 +22,13 @@ from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.ros import qos
 from chute_ros.ros.deploy_action_node import DeployActionNode
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.tools.chute.calling import Call
+from chute_ros.tools.chute.calling import OrderCall
 from chute_ros.tools.chute.gathering import gather
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.node_parameters import parameters_of_node
 from chute_ros.tools.chute.options import parse
 from chute_ros.tools.chute.order import order_of
-from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.session import ChuteSession
 from chute_ros.tools.chute.surroundings import surroundings
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.panel import node as panel
@@ -190,14 +190,14 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
 
 
 def test_the_command_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
-    session = Session(bench.namespace, surroundings({}, ()))
+    session = ChuteSession(bench.namespace, surroundings({}, ()))
     bench.at_end.callback(session.close)
     # Of a subscription for a moment as well something is left to be seen.
     monkeypatch.setattr(session.node, "destroy_subscription", lambda one: None)
     Listening(session)
     gather(session, 0.0)
     for words in ORDERS:
-        Call(session, order_of(parse(words), "ann@ground"), "ann@ground")
+        OrderCall(session, order_of(parse(words), "ann@ground"), "ann@ground")
     for node in (*sorted(set(NODES) - PLAIN), "standby"):
         parameters_of_node(session, node, 0.0)
     name = session.node.get_name()

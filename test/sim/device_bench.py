@@ -10,6 +10,16 @@ from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
 COMPUTER = (1, 191)
 
 
+def crc(data: bytes) -> int:
+    """CRC-16/MCRF4XX, bit by bit, independent of the library."""
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0x8408 if value & 1 else 0)
+    return value
+
+
 class Station:
     """Sends to a device and keeps what it sends. now: s, moves only by run."""
 

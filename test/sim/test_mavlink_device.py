@@ -1,7 +1,7 @@
 """What every simulated MAVLink device does: streams, requests, silence, restarts, packets."""
 
 import pytest
-from device_bench import Station
+from device_bench import Station, crc
 
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -228,16 +228,6 @@ def test_its_packets_are_these_bytes():
         extra = 50 if raw[7] == 0 else 85
         assert raw[:-2].hex(" ") == expected.hex(" ")
         assert int.from_bytes(raw[-2:], "little") == crc(raw[1:-2] + bytes([extra]))
-
-
-def crc(data):
-    """CRC-16/MCRF4XX, spelled out."""
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0x8408 if value & 1 else 0)
-    return value
 
 
 def test_frames_are_numbered_without_a_gap():

@@ -109,7 +109,7 @@ def autopilot(story: Story, fact: AutopilotFact) -> Told:
 def test_an_autopilot_that_was_never_heard_is_not_lost() -> None:
     story = Story()
     story.at(60.0)
-    assert autopilot(story, AutopilotFact.LOST) == Told(None, "autopilot never heard")
+    assert autopilot(story, AutopilotFact.LOST) == Told(None, "vehicle/state never received")
 
 
 def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None:
@@ -159,7 +159,7 @@ def test_an_autopilot_that_restarts_counts_in_flight_only() -> None:
     story.fly(1.1, reboot_count=2, rebooted_in_flight=True)
     found = autopilot(story, AutopilotFact.REBOOTED)
     assert found == Told(True, "autopilot restarts in flight 1")
-    assert story.said().count("the autopilot started anew in flight") == 1
+    assert story.said().count("the autopilot restarted in flight") == 1
 
 
 # -- devices -------------------------------------------------------------------------------------
@@ -298,11 +298,14 @@ def test_samples_that_cannot_be_used_were_seen_all_the_same() -> None:
 
 def test_every_link_is_told_with_what_was_asked_for_and_judged_by_its_own_limits() -> None:
     known = state(links=links(a=heard(0.2), b=heard(5.0)))
-    text = "link a is OK, heard 0.20 s ago, b is LOST, heard 5.00 s ago (asked for: STALE or LOST)"
+    text = (
+        "link a is OK, last received 0.20 s ago, b is LOST, last received 5.00 s ago "
+        "(asked for: STALE or LOST)"
+    )
     assert told(CONFIG, known, LinkCondition(ANY, SILENT), NOW) == Told(True, text)
     assert told(CONFIG, known, LinkCondition(ALL, SILENT), NOW) == Told(False, text)
     assert told(CONFIG, known, LinkCondition(ALL, SILENT), NOW + 9.0).holds is True
-    one = "link b is LOST, heard 5.00 s ago (asked for: LOST)"
+    one = "link b is LOST, last received 5.00 s ago (asked for: LOST)"
     assert told(CONFIG, known, LinkCondition("b", LOST), NOW) == Told(True, one)
     assert told(CONFIG, known, LinkCondition("a", LOST), NOW).holds is False
     either = LinkCondition("a", (LinkJudgement.LOST, LinkJudgement.OK))
@@ -343,9 +346,9 @@ def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
 @pytest.mark.parametrize(
     ("minimum", "speed", "holds", "words"),
     [
-        (50.0, math.nan, True, "(minimum 50 m), and nothing tells whether it falls"),
-        (50.1, math.nan, False, "(minimum 50.1 m), and nothing tells whether it falls"),
-        (50.0, -4.0, False, "(minimum 50 m), and something tells whether it falls"),
+        (50.0, math.nan, True, "(minimum 50 m), and nothing reports whether it falls"),
+        (50.1, math.nan, False, "(minimum 50.1 m), and nothing reports whether it falls"),
+        (50.0, -4.0, False, "(minimum 50 m), and something reports whether it falls"),
     ],
 )
 def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(

@@ -101,7 +101,7 @@ def test_what_another_source_contradicts_is_doubted() -> None:
         report = replace(told, disputed=frozenset({"attitude"}))
         story.at(story.t + 0.05, story.heartbeat(), report)
     assert story.fired() == []
-    assert doubt(story, "tilt_deg") == "another source told otherwise"
+    assert doubt(story, "tilt_deg") == "another source reported otherwise"
     assert doubt(story, "acceleration") == ""
     story.fly(story.t + 1.0, **LOST, tilt=90.0)
     assert story.fired()[0] == "KILL"

@@ -381,7 +381,7 @@ def test_an_autopilot_that_starts_anew_at_height_and_falls_is_deployed(name: str
 def test_an_autopilot_that_starts_anew_and_flies_on_is_not_deployed() -> None:
     story = aloft().fly(20.0, **ANEW)
     assert story.fired() == []
-    assert story.alarms() == ["the autopilot started anew in flight"]
+    assert story.alarms() == ["the autopilot restarted in flight"]
 
 
 def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back() -> None:

@@ -162,7 +162,7 @@ def test_the_height_of_an_autopilot_that_started_anew_is_not_used() -> None:
     story.fly(1.0, height=0.0, reboot_count=1, rebooted_in_flight=True)
     now = START + story.t
     assert math.isnan(readings.measured(story.config, story.state, "height", now))
-    assert "started anew" in readings.unusable(story.config, story.state, "height", now)
+    assert "restarted" in readings.unusable(story.config, story.state, "height", now)
     assert readings.unusable(story.config, story.state, "acceleration", now) == ""
 
 
@@ -303,7 +303,7 @@ def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own() -> N
     for name in ("climb_rate", "height"):
         value, why = readings.reading(CONFIG, anew, name, 0.4)
         assert math.isnan(value)
-        assert why == "the autopilot started anew in flight, and its height with it"
+        assert why == "the autopilot restarted in flight, and its height with it"
 
 
 @pytest.mark.parametrize(

@@ -198,7 +198,7 @@ def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -
     story.fall(12.0, 80.0, landed_state=GROUND, armed=Armed.DISARMED)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert START + 8.0 < story.state.flight.airborne_since < START + 9.0
-    assert "it falls since the kill, although it said that it stood" in story.alarms()
+    assert "it falls since the kill, although it was reported to stand" in story.alarms()
 
 
 def test_one_that_stands_when_it_is_killed_and_is_carried_away_is_not() -> None:

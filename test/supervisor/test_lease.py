@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
-from chute_ros.supervisor.lease import TRANSITIONS, Claim, Event, Lease, LeaseConfig, Role
+from chute_ros.supervisor.lease import TRANSITIONS, Claim, Lease, LeaseConfig, LeaseEvent, Role
 from chute_ros.transitions import after
 
 FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)
@@ -38,8 +38,8 @@ def following(config: LeaseConfig, heard: float = T) -> Lease:
     return Lease(Role.FOLLOWING, T - 10.0, looked_at=heard, leader="a", leader_heard=heard)
 
 
-@pytest.mark.parametrize(("role", "event"), list(product(Role, Event)))
-def test_a_pair_that_the_table_does_not_list_raises(role: Role, event: Event) -> None:
+@pytest.mark.parametrize(("role", "event"), list(product(Role, LeaseEvent)))
+def test_a_pair_that_the_table_does_not_list_raises(role: Role, event: LeaseEvent) -> None:
     if (role, event) in TRANSITIONS:
         assert after(TRANSITIONS, role, event) is TRANSITIONS[role, event]
     else:
@@ -67,7 +67,7 @@ def test_one_of_several_that_starts_looks_for_a_leader_before_it_leads() -> None
         lease, event = lease.looked(FIRST, T + tenth * 0.1)
         assert event is None
     lease, event = lease.looked(FIRST, T + 4.5)
-    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
 def test_one_that_starts_beside_a_leader_follows_it() -> None:
@@ -90,7 +90,7 @@ def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(
         lease, event = lease.looked(config, T + tenth * 0.1)
         assert event is None
     lease, event = lease.looked(config, T + wait)
-    assert event is Event.SILENCE
+    assert event is LeaseEvent.SILENCE
     assert lease.role is Role.LEADING
 
 
@@ -109,7 +109,7 @@ def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence(
     # And if it did fall silent, the takeover is only later.
     for tenth in range(35, 42):
         lease, event = lease.looked(SECOND, T + tenth * 0.1)
-    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
 def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
@@ -117,16 +117,16 @@ def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
     lease, event = lease.looked(FIRST, T + 0.5)
     assert event is None
     lease, event = lease.looked(FIRST, T + 1.1)
-    assert (lease.role, event) == (Role.FOLLOWING, Event.OVERSLEPT)
+    assert (lease.role, event) == (Role.FOLLOWING, LeaseEvent.OVERSLEPT)
     # Nobody took over: it leads again after the lease's time.
     for tenth in range(12, 17):
         lease, event = lease.looked(FIRST, T + tenth * 0.1)
-    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
 def test_of_two_that_lead_the_one_that_came_later_goes_on() -> None:
     lease, event = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("b", 1, 9), T + 1.0)
-    assert (lease.role, event, lease.leader) == (Role.FOLLOWING, Event.OUTRANKED, "b")
+    assert (lease.role, event, lease.leader) == (Role.FOLLOWING, LeaseEvent.OUTRANKED, "b")
     assert (lease.waiting_since, lease.leader_heard) == (T + 1.0, T + 1.0)
     lease, event = leading(SECOND).heard(SECOND, claim("b", 1, 9), claim("a", 0, 8), T)
     assert (lease.role, event) == (Role.LEADING, None)
@@ -136,9 +136,9 @@ def test_one_that_knows_of_nothing_yields_to_one_that_knows_of_a_flight() -> Non
     # It was started in flight and did not find the leader in time: its number is the higher.
     fresh, flying = claim("b", 1, 9, empty=True), claim("a", 0, 8)
     lease, event = leading(SECOND).heard(SECOND, fresh, flying, T)
-    assert (lease.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
+    assert (lease.role, event) == (Role.FOLLOWING, LeaseEvent.OUTRANKED)
     lease, event = leading(FIRST).heard(FIRST, flying, fresh, T)
-    assert (lease.role, event) == (Role.LEADING, Event.OVERTAKES)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.OVERTAKES)
     assert lease.next_epoch(FIRST, 8) == 12, "above the one that devices may have seen"
 
 
@@ -161,7 +161,7 @@ def test_of_two_leaders_exactly_one_yields(
     theirs = claim("b", other_rank, epoch_above(other_seen, other_rank), empty=other_empty)
     _, first = leading(one).heard(one, mine, theirs, T)
     _, second = leading(other).heard(other, theirs, mine, T)
-    assert (first is Event.OUTRANKED) != (second is Event.OUTRANKED)
+    assert (first is LeaseEvent.OUTRANKED) != (second is LeaseEvent.OUTRANKED)
 
 
 def test_a_follower_is_no_rival() -> None:
@@ -173,14 +173,14 @@ def test_a_follower_is_no_rival() -> None:
 
 def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -> None:
     lease, event = leading(FIRST).refused(9, T)
-    assert (lease.role, event) == (Role.FOLLOWING, Event.REFUSED)
+    assert (lease.role, event) == (Role.FOLLOWING, LeaseEvent.REFUSED)
     assert (lease.highest, lease.leader) == (9, "")
     assert math.isnan(lease.leader_heard)
     for tenth in range(1, 50):
         lease, event = lease.looked(FIRST, T + tenth * 0.1)
         assert event is None
     lease, event = lease.looked(FIRST, T + 5.0)
-    assert event is Event.SILENCE
+    assert event is LeaseEvent.SILENCE
     assert lease.next_epoch(FIRST, 8) == 12
 
 
@@ -191,10 +191,10 @@ def test_one_that_was_refused_stands_back_all_the_same_and_then_leads_from_then_
     assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
     now = refused.stand_back_until
     lease, event = refused.heard(FIRST, own, other, now)
-    assert (lease.role, event, lease.waiting_since) == (Role.LEADING, Event.KNOWS_MORE, now)
+    assert (lease.role, event, lease.waiting_since) == (Role.LEADING, LeaseEvent.KNOWS_MORE, now)
 
 
-def claims(lease: Lease, leader: int, own: int, tenths: range) -> tuple[Lease, Event | None]:
+def claims(lease: Lease, leader: int, own: int, tenths: range) -> tuple[Lease, LeaseEvent | None]:
     """The leader, a, claims ten times a second to hear so many links; b, that follows, so many."""
     event = None
     for tenth in tenths:
@@ -213,12 +213,12 @@ def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
     lease, event = claims(following(SECOND), 0, 2, range(1, 11))
     assert event is None
     lease, event = claims(lease, 0, 2, range(11, 20))
-    assert (lease.role, event) == (Role.LEADING, Event.HEARS_MORE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.HEARS_MORE)
     assert lease.looked_at == pytest.approx(T + 1.1), "the lease's time for the second in rank"
     # The deaf one, when it hears again, yields to the higher epoch.
     later = replace(hears("b", 1, 2), epoch=lease.next_epoch(SECOND, 8))
     first, event = leading(FIRST).heard(FIRST, hears("a", 0, 0), later, T + 9.0)
-    assert (first.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
+    assert (first.role, event) == (Role.FOLLOWING, LeaseEvent.OUTRANKED)
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_one_that_starts_again_and_knows_of_a_flight_takes_over_from_one_that_do
     own = knows("a", 0, not knows_itself, hears, leading=False)
     other = knows("b", 1, not leader_knows, 2, leading=True)
     lease, event = lease.heard(FIRST, own, other, T + 0.1)
-    assert (event is Event.KNOWS_MORE) is takes_over
+    assert (event is LeaseEvent.KNOWS_MORE) is takes_over
     assert (lease.role is Role.LEADING) is takes_over
     undecided = not leader_knows and knows_itself and hears < 2
     assert (lease.leader == "b") is (not takes_over and not undecided)
@@ -254,7 +254,7 @@ def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens() -> None:
     lease, event = lease.heard(FIRST, deaf, other, T + 3.9)
     assert (lease.leader, event) == ("", None)
     later, event = lease.heard(FIRST, replace(deaf, links_heard=2), other, T + 3.95)
-    assert (later.role, event) == (Role.LEADING, Event.KNOWS_MORE)
+    assert (later.role, event) == (Role.LEADING, LeaseEvent.KNOWS_MORE)
     lease, event = lease.heard(FIRST, deaf, other, T + 4.0)
     assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
 
@@ -289,7 +289,7 @@ def test_a_follower_that_slept_counts_from_its_waking() -> None:
 
 def looks(
     lease: Lease, tenths: range, link_heard: float | None = None
-) -> tuple[Lease, Event | None]:
+) -> tuple[Lease, LeaseEvent | None]:
     """b looks ten times a second and hears no leader; links are heard always, or last then."""
     event = None
     for tenth in tenths:
@@ -311,14 +311,14 @@ def test_a_follower_whose_network_is_gone_does_not_take_over() -> None:
     lease, event = looks(lease, range(110, 119))
     assert (lease.role, event) == (Role.FOLLOWING, None)
     lease, event = looks(lease, range(119, 130))
-    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
 def test_a_leader_is_dead_where_links_are_heard_after_it() -> None:
     lease, event = looks(following(SECOND), range(1, 10), link_heard=T + 0.5)
     assert event is None
     lease, event = looks(lease, range(10, 11), link_heard=T + 0.5)
-    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+    assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
 def test_where_links_are_rarely_heard_the_next_heartbeat_decides() -> None:
@@ -328,7 +328,7 @@ def test_where_links_are_rarely_heard_the_next_heartbeat_decides() -> None:
         lease, event = lease.looked(slow, T + tenth * 0.1, T - 0.1)
         assert event is None
     lease, event = lease.looked(slow, T + 3.0, T + 3.0)
-    assert event is Event.SILENCE
+    assert event is LeaseEvent.SILENCE
 
 
 def test_two_of_one_rank_are_noticed() -> None:
@@ -402,7 +402,7 @@ def test_one_that_was_deaf_while_it_listened_after_its_start_listens_on() -> Non
 def test_one_that_takes_over_has_no_leader_any_more() -> None:
     lease = Lease(Role.FOLLOWING, T - 10.0, looked_at=T, leader="b", leader_heard=T)
     lease, event = lease.looked(FIRST, T + 0.5)
-    assert (event, lease.role, lease.leader) == (Event.SILENCE, Role.LEADING, "")
+    assert (event, lease.role, lease.leader) == (LeaseEvent.SILENCE, Role.LEADING, "")
     assert lease.waiting_since == T + 0.5
     assert math.isnan(lease.leader_heard)
 
@@ -425,10 +425,10 @@ def test_one_that_took_over_as_it_hears_more_forgets_that_with_the_lease() -> No
         Role.FOLLOWING, T, looked_at=T, leader="b", leader_heard=T, hears_more_since=T - 0.25
     )
     lease, event = lease.looked(FIRST, T + 0.25)
-    assert (event, lease.role, lease.leader) == (Event.HEARS_MORE, Role.LEADING, "")
+    assert (event, lease.role, lease.leader) == (LeaseEvent.HEARS_MORE, Role.LEADING, "")
     assert lease.waiting_since == T + 0.25
     lease, event = lease.looked(FIRST, T + 1.0)
-    assert event is Event.OVERSLEPT
+    assert event is LeaseEvent.OVERSLEPT
     assert lease.deadline(FIRST) == T + 1.5, "it has to hear less anew"
 
 

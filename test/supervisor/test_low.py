@@ -85,7 +85,7 @@ def test_what_fell_silent_is_taken_to_have_fallen_since(height: float, waits: fl
     assert story.newest(K).rule == "autopilot lost and falling"
     assert waited(story) == waits
     if waits == 0.2:
-        assert f"{height:.1f} m told 2." in "; ".join(story.newest(D).reasons)
+        assert f"{height:.1f} m reported 2." in "; ".join(story.newest(D).reasons)
 
 
 @pytest.mark.parametrize("silent", [1.0, 3.0, 10.0])

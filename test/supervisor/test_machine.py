@@ -5,14 +5,14 @@ import itertools
 import pytest
 
 from chute_ros.errors import TransitionError
-from chute_ros.supervisor.machine import TRANSITIONS, Event, Stage, listed
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, StageEvent, listed
 from chute_ros.transitions import after
 
-PAIRS = list(itertools.product(Stage, Event))
+PAIRS = list(itertools.product(Stage, StageEvent))
 
 
 @pytest.mark.parametrize(("stage", "event"), PAIRS, ids=lambda one: one.name)
-def test_a_pair_is_listed_or_raises(stage: Stage, event: Event) -> None:
+def test_a_pair_is_listed_or_raises(stage: Stage, event: StageEvent) -> None:
     if (stage, event) in TRANSITIONS:
         assert listed(stage, event)
         assert after(TRANSITIONS, stage, event) is TRANSITIONS[stage, event]
@@ -39,9 +39,9 @@ def test_deploying_is_entered_only_from_killing() -> None:
 
 def test_only_a_reset_a_person_who_insists_or_a_device_that_erred_leaves_deployed() -> None:
     ways = {event for (before, event) in TRANSITIONS if before is Stage.DEPLOYED}
-    assert ways == {Event.RESET, Event.KILL, Event.TAKEN_BACK}
+    assert ways == {StageEvent.RESET, StageEvent.KILL, StageEvent.TAKEN_BACK}
 
 
 def test_nothing_but_a_reset_leads_back_to_the_start() -> None:
     ways = {s for (_, s), after in TRANSITIONS.items() if after is Stage.STARTUP}
-    assert ways == {Event.RESET}
+    assert ways == {StageEvent.RESET}

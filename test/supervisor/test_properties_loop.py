@@ -16,7 +16,7 @@ from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
-from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
+from chute_ros.supervisor.decision_gate import DecisionGate, DecisionVerdict
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
@@ -119,17 +119,17 @@ class Loop:
             return  # the decisions' topic keeps nothing for who comes later
         verdict = node.gate.judge(decision, age)
         number = (decision.epoch, decision.id)
-        if verdict is Verdict.ACT:
+        if verdict is DecisionVerdict.ACT:
             node.acted.append((self.now, decision.action))
             if decision.action is D:
                 assert D not in node.confirmed, "fired again after its confirmation was heard"
             self.report(node, decision, Outcome.SENT)
             gate = node.gate
             self.at(self.now + DEVICE_DELAY, lambda: self.effect(node, gate, decision))
-        elif verdict is Verdict.REPEATED and number in node.reports:
+        elif verdict is DecisionVerdict.REPEATED and number in node.reports:
             report = node.reports[number]
             self.send(f"from {node.link}", lambda: self.hear(report, node))
-        elif verdict is Verdict.OLDER:
+        elif verdict is DecisionVerdict.OLDER:
             self.report(node, decision, Outcome.FAILED)
 
     def effect(self, node: Node, gate: DecisionGate, decision: Decision) -> None:

@@ -446,7 +446,7 @@ def reboots(*told: tuple[dict[str, Any], int, bool]) -> Story:
 
 
 UP: dict[str, Any] = {"armed": Armed.ARMED, "landed_state": LandedState.IN_AIR}
-ANEW = ["the autopilot started anew in flight"]
+ANEW = ["the autopilot restarted in flight"]
 
 
 @pytest.mark.parametrize(

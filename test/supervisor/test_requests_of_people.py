@@ -434,7 +434,7 @@ def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again
     story = flying().fly(1.0)
     again = {"rebooted_in_flight": True, "reboot_count": 1}
     story.fly(1.5, **again)
-    assert "the autopilot started anew in flight" in story.alarms()
+    assert "the autopilot restarted in flight" in story.alarms()
     story.at(1.6, STOP)
     story.fly(14.0, **again, **DOWN, height=0.0, vertical_speed=0.0)
     story.at(14.1, story.told(**again, **DOWN, height=0.0), i.ResetRequest(2))

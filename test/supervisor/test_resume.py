@@ -103,7 +103,7 @@ def test_on_the_ground_with_nothing_under_way_it_starts_anew() -> None:
 @pytest.mark.parametrize(
     ("boot", "settings", "within", "after", "why"),
     [
-        ("another", SETTINGS, 30.0, 1.0, "the computer has started anew since"),
+        ("another", SETTINGS, 30.0, 1.0, "the computer has restarted since"),
         (BOOT, "others", 30.0, 1.0, "the parameters or the profile have changed since"),
         (BOOT, SETTINGS, 30.0, 31.0, "it is 31.0 s old (limit 30 s)"),
         (BOOT, SETTINGS, 30.0, -1.0, "it is -1.0 s old (limit 30 s)"),

@@ -59,7 +59,7 @@ def test_a_vehicle_that_is_guarded_says_no_more_than_that_it_flies() -> None:
 
 def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded() -> None:
     story = goes_on(flying(), 2.0, upf_can=LinkState.LOST)
-    warning = "rule 'link lost' warns: a device is not heard"
+    warning = "rule 'link lost' warns: nothing is received from a device"
     assert text(story) == f"IN_FLIGHT: {warning}"
     assert told(story) == (warning,)
     # When it is heard again, then the warning is over.
@@ -72,7 +72,7 @@ def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded() -> None
     story = goes_on(flying(), 2.0, mavlink_parachute=LinkState.LOST, upf_can=LinkState.LOST)
     why = f"no parachute can be reached: {LINK} is LOST, {UPF} is LOST"
     assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
-    assert told(story) == ("rule 'link lost' warns: a device is not heard", why)
+    assert told(story) == ("rule 'link lost' warns: nothing is received from a device", why)
     assert text(goes_on(story, 4.0)) == "IN_FLIGHT"
 
 
@@ -90,7 +90,7 @@ def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded() -> None:
     # When its link is cut, then its nodes are heard and nothing of it is,
     while story.t < 4.0:
         story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF))
-    why = "nothing tells whether it falls: no vertical speed, acceleration or height"
+    why = "nothing reports whether it falls: no vertical speed, acceleration or height"
     assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
     # and both of what is wrong is an alarm.
     lost = "rule 'autopilot lost' warns: the autopilot is silent; if it falls, deploy by hand"
@@ -105,7 +105,7 @@ def test_heights_alone_are_enough_to_see_a_fall() -> None:
         step += 1
         moved = {**flies, "height": 50.0 + 0.01 * (step % 7)}
         story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF), vehicle(**moved))
-    assert "nothing tells" not in text(story)
+    assert "nothing reports" not in text(story)
 
 
 def test_a_profile_that_releases_nothing_itself_says_who_does() -> None:

@@ -13,7 +13,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor import sending
 from chute_ros.supervisor.answers import answer_all, deploy_details, end_kill, give_up_waiting
 from chute_ros.supervisor.config import Rung, SupervisorConfig
-from chute_ros.supervisor.machine import Event, Stage
+from chute_ros.supervisor.machine import Stage, StageEvent
 from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.sending import (
     fire,
@@ -61,9 +61,9 @@ def reports(**outcomes: Outcome) -> MappingProxyType[str, frozenset[Outcome]]:
 
 def test_a_move_is_said_with_its_reason_and_without_one() -> None:
     one = steps()
-    one.move(Event.LINKS_HEALTHY)
-    one.move(Event.KILL, "smoke")
-    one.move(Event.KILL, "smoke again")
+    one.move(StageEvent.LINKS_HEALTHY)
+    one.move(StageEvent.KILL, "smoke")
+    one.move(StageEvent.KILL, "smoke again")
     assert (one.state.stage, one.state.stage_since) == (Stage.KILLING, 100.0)
     assert one.outputs == [
         i.LogMessage("STARTUP -> READY: every required link is healthy"),

@@ -154,7 +154,7 @@ def test_a_height_that_the_barometer_denies_is_told_in_flight() -> None:
     teller = up("multirotor", barometer_stops=0.0)
     told = [one for one in teller.story.alarms() if one.startswith("height is contradicted")]
     assert len(told) == 1
-    assert "above the take-off where it tells" in told[0]
+    assert "above the take-off where it reports" in told[0]
 
 
 def test_heights_that_differ_as_weather_and_warmth_make_them_are_not() -> None:
@@ -162,7 +162,7 @@ def test_heights_that_differ_as_weather_and_warmth_make_them_are_not() -> None:
     assert height_denied(3.0, 20.0) == ""
     assert height_denied(math.nan, 90.0) == height_denied(90.0, math.nan) == ""
     assert height_denied(80.0, 0.3) == (
-        "the barometer tells 0 m above the take-off where it tells 80"
+        "the barometer reports 0 m above the take-off where it reports 80"
     )
 
 

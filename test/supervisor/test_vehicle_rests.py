@@ -49,7 +49,7 @@ def looked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     judge = policy.judge
 
-    def noted(config: Any, state: Any, one: Rule, now: float) -> policy.Judged:
+    def noted(config: Any, state: Any, one: Rule, now: float) -> policy.JudgedRule:
         names.append(one.name)
         return judge(config, state, one, now)
 

@@ -14,7 +14,7 @@ from chute_msgs.msg import (
     VehicleState,
 )
 
-from chute_ros.tools.chute.hearing import Picture
+from chute_ros.tools.chute.hearing import ReceivedMessages
 from chute_ros.tools.chute.status_text import status_lines
 from chute_ros.tools.chute.view import view
 
@@ -89,7 +89,7 @@ class Heard:
     """A picture, and what it shows."""
 
     def __init__(self):
-        self.picture = Picture()
+        self.picture = ReceivedMessages()
 
     def hears(self, message, at=0.0):
         """A message is received at t+at."""

@@ -132,14 +132,14 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
         *("--seed", str(SEEDS[0]), "--flights", str(len(SEEDS)), "--resume", str(file)),
         *("--failures", str(tmp_path), "--page", str(tmp_path / "page.md"), "--scheduler"),
     ]
-    look = campaign_command._Progress.look
+    look = campaign_command._CampaignProgress.look
 
     def killing(progress, tally):
         look(progress, tally)
         if tally.flights == BUNDLE:
             cluster.scheduler.kill()
 
-    monkeypatch.setattr(campaign_command._Progress, "look", killing)
+    monkeypatch.setattr(campaign_command._CampaignProgress, "look", killing)
     told = run(monkeypatch, *options, cluster.address)
     assert told == (
         f"campaign: the scheduler at {cluster.address} is gone; the flights until then are "
@@ -147,7 +147,7 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
     )
     first = re.search(rf"^(\d+) of {len(SEEDS)} flights in", capsys.readouterr().out, re.M)
     assert BUNDLE <= int(first[1]) < len(SEEDS)
-    monkeypatch.setattr(campaign_command._Progress, "look", look)
+    monkeypatch.setattr(campaign_command._CampaignProgress, "look", look)
     monkeypatch.setattr(flights.Tally, "__eq__", None)
     monkeypatch.setattr(
         campaign_command, "page", lambda tally, *_: pages.append(kept(tally)) or "# page\n\n"

@@ -16,7 +16,7 @@ from chute_ros.campaign import campaign as flights
 from chute_ros.campaign import checkpoint
 from chute_ros.campaign.checkpoint import code_that_flies
 from chute_ros.campaign.draw import draw
-from chute_ros.campaign.judge import Count, Judged
+from chute_ros.campaign.judge import Count, JudgedFlight
 from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
@@ -259,7 +259,7 @@ def test_all_code_of_a_flight_counts_and_no_other(tmp_path, monkeypatch, changed
 @pytest.fixture
 def all_missed(monkeypatch):
     """A campaign whose every flight is judged as missed."""
-    monkeypatch.setattr(flights, "judge", lambda flown: Judged(Count.MISSED, "for a test"))
+    monkeypatch.setattr(flights, "judge", lambda flown: JudgedFlight(Count.MISSED, "for a test"))
 
 
 def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_path, capsys):

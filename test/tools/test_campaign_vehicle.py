@@ -12,8 +12,8 @@ import pytest
 from command_bench import assert_refused, call
 
 from chute_ros.campaign.cases import Case
-from chute_ros.campaign.heights import Found
-from chute_ros.campaign.needed_height import Fall, Needed, Stage
+from chute_ros.campaign.heights import CaseFlights
+from chute_ros.campaign.needed_height import Fall, FallStage, Needed
 from chute_ros.campaign.scenario import Failure
 from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools import campaign_vehicle
@@ -28,18 +28,18 @@ PLANE = str(EXAMPLES / "example_aeroplane.yaml")
 run = partial(call, campaign)
 
 
-def found(name: str, *every: float) -> Found:
+def found(name: str, *every: float) -> CaseFlights:
     """A failure whose flights need these heights, m, and take a tenth of it in s."""
     case = Case(name, "it fails", Failure.MOTOR)
     flights = []
     for seed, height in enumerate(every):
         lost = min(height, 80.0)
-        stages = (Stage(lost / 40.0, lost / 4.0), Stage(lost / 20.0, lost / 2.0))
-        one = Fall(80.0, *stages, Stage(lost / 10.0, lost), math.nan)
+        stages = (FallStage(lost / 40.0, lost / 4.0), FallStage(lost / 20.0, lost / 2.0))
+        one = Fall(80.0, *stages, FallStage(lost / 10.0, lost), math.nan)
         saved = height < 80.0
-        usual = one if saved else Fall(80.0, Stage(), Stage(), Stage(), 20.0)
+        usual = one if saved else Fall(80.0, FallStage(), FallStage(), FallStage(), 20.0)
         flights.append(Needed(seed, height, usual, saved, one if saved else None))
-    return Found(case, tuple(flights))
+    return CaseFlights(case, tuple(flights))
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from chute_ros.tools.chute.finding import (
     NOTE,
     OK,
     WRONG,
-    Finding,
+    DoctorFinding,
     finding_lines,
     worst_first,
 )
@@ -37,7 +37,11 @@ def task(level="ERROR", name="drone1/upf_can: link", message="no such port"):
 
 
 def test_the_worst_comes_first_each_on_one_line_with_its_remedy():
-    findings = [Finding(OK, "disk"), Finding(NOTE, "domain", "use 0"), Finding(WRONG, "port", "x")]
+    findings = [
+        DoctorFinding(OK, "disk"),
+        DoctorFinding(NOTE, "domain", "use 0"),
+        DoctorFinding(WRONG, "port", "x"),
+    ]
     assert finding_lines(worst_first(findings)) == [
         "WRONG  port -> x",
         "NOTE   domain -> use 0",
@@ -65,7 +69,7 @@ def test_the_worst_comes_first_each_on_one_line_with_its_remedy():
 def test_the_environment_is_told_as_the_user_set_it(environment, text):
     around = surroundings(environment, INSTALLED)
     assert around.text() == text
-    assert computer.environment_findings(around) == [Finding(OK, f"environment: {text}")]
+    assert computer.environment_findings(around) == [DoctorFinding(OK, f"environment: {text}")]
 
 
 @pytest.mark.parametrize(
@@ -179,7 +183,7 @@ def test_what_a_node_says_of_its_wire_counts_wherever_it_runs():
     found = ports.connection_finding("upf_can", "socketcan:can0", task("OK"), lambda _: "missing")
     assert found.level == OK
     found = ports.connection_finding("upf_can", "socketcan:can0", task("ERROR"), lambda _: "none")
-    assert found == Finding(
+    assert found == DoctorFinding(
         WRONG,
         "connection socketcan:can0 of upf_can: no such port",
         "here: none; if upf_can runs on another computer, look there",

@@ -15,10 +15,10 @@ import pytest
 from chute_bench import COMMAND, ROOT
 from rocket_operator import commands_to
 
-from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.demo_rig import DemoRig
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
-from chute_ros.tools.rocket_rig import RocketRig
+from chute_ros.tools.rocket_rig import DemoRocketRig
 
 # Each flight takes the machine for half a minute.
 pytestmark = pytest.mark.xdist_group("chute flights")
@@ -117,7 +117,7 @@ def terminal(namespace, await_until):
 def rig(request, namespace, tmp_path):
     """A drone on the ground, with a MAVLink parachute or those that a test names."""
     processes = Processes(tmp_path)
-    one = Rig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
+    one = DemoRig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
     one.start_supervisor("supervisor")
     one.start_vehicle()
     one.start_parachute()
@@ -245,7 +245,7 @@ def command(namespace):
 def test_a_rocket_whose_drogue_a_person_releases(namespace, terminal, command, tmp_path):
     processes = Processes(tmp_path)
     # Nobody else releases: a rule would on a machine that is busy, before the person has.
-    rocket = RocketRig("", namespace, processes, tmp_path, profile="by_hand")
+    rocket = DemoRocketRig("", namespace, processes, tmp_path, profile="by_hand")
     try:
         rocket.start_ground()
         rocket.plug_cable_in()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from chute_ros.tools.chute.options import parse
-from chute_ros.tools.chute.order import Answer, answer_text, not_answered, order_of
+from chute_ros.tools.chute.order import ServiceAnswer, answer_text, not_answered, order_of
 
 WHO = "ann@ground"
 
@@ -83,14 +83,14 @@ def test_a_person_reads_what_will_be_done(arguments, does):
 @pytest.mark.parametrize(
     ("answer", "text", "code"),
     [
-        (Answer(True, "confirmed", True), "deploy: done: confirmed", 0),
+        (ServiceAnswer(True, "confirmed", True), "deploy: done: confirmed", 0),
         (
-            Answer(False, "no status", True),
+            ServiceAnswer(False, "no status", True),
             "deploy: ACCEPTED, NOT CONFIRMED: no status",
             1,
         ),
-        (Answer(False, "mode is SHADOW", False), "deploy: NOT DONE: mode is SHADOW", 1),
-        (Answer(False, ""), "deploy: NOT DONE: no message", 1),
+        (ServiceAnswer(False, "mode is SHADOW", False), "deploy: NOT DONE: mode is SHADOW", 1),
+        (ServiceAnswer(False, ""), "deploy: NOT DONE: no message", 1),
     ],
 )
 def test_an_answer_tells_done_accepted_and_refused_apart(answer, text, code):
@@ -99,7 +99,7 @@ def test_an_answer_tells_done_accepted_and_refused_apart(answer, text, code):
 
 def test_a_message_is_shown_whole():
     long = "; ".join(f"reason {number}" for number in range(200))
-    assert answer_text(order("arm"), Answer(False, long)).endswith(long)
+    assert answer_text(order("arm"), ServiceAnswer(False, long)).endswith(long)
 
 
 def test_without_an_answer_nobody_knows_whether_it_was_carried_out():

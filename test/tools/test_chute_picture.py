@@ -16,7 +16,7 @@ from heard_vehicle import Heard, heartbeat, parachute, stamped, state, vehicle
 
 from chute_ros.tools.chute.hearing import MOST_NAMES
 from chute_ros.tools.chute.json_text import json_text
-from chute_ros.tools.chute.status_text import Line, decision_lines, headline, order_lines
+from chute_ros.tools.chute.status_text import StatusLine, decision_lines, headline, order_lines
 
 
 @pytest.fixture
@@ -359,7 +359,7 @@ def unguarded():
     why = "no parachute can be reached: mavlink_parachute is LOST"
     return state(
         state_text=f"IN_FLIGHT, NOT GUARDED: {why}",
-        alarms=["rule 'link lost' warns: a device is not heard", why],
+        alarms=["rule 'link lost' warns: nothing is received from a device", why],
         rules=[WARNS],
         link_states=[3],
         devices_healthy=[False],
@@ -371,7 +371,7 @@ def test_a_vehicle_that_nobody_guards_says_so_in_its_first_line_and_is_not_well(
     assert text[0] == "IN_FLIGHT, NOT GUARDED"
     assert text[3:6] == [
         "  why                no parachute can be reached: mavlink_parachute is LOST",
-        "  ALARM              rule 'link lost' warns: a device is not heard",
+        "  ALARM              rule 'link lost' warns: nothing is received from a device",
         "  flight             not blocked",
     ]
     assert "  link lost: warns" in text
@@ -382,9 +382,9 @@ def test_a_vehicle_that_nobody_guards_says_so_in_its_first_line_and_is_not_well(
 
 def test_an_alarm_alone_takes_the_calm_colour_away(heard):
     heard.hears(stamped(state(alarms=["rule 'battery dead' warns: it is empty"])))
-    assert headline(heard.view()) == Line("IN_FLIGHT", "warn")
+    assert headline(heard.view()) == StatusLine("IN_FLIGHT", "warn")
     heard.hears(stamped(unguarded(), at=0.1), at=0.1)
-    assert headline(heard.view(0.1)) == Line("IN_FLIGHT, NOT GUARDED", "bad")
+    assert headline(heard.view(0.1)) == StatusLine("IN_FLIGHT, NOT GUARDED", "bad")
 
 
 def test_the_mode_is_told_once(heard):

@@ -10,7 +10,7 @@ from chute_msgs.msg import RuleState, SafetyDecision, SafetyState
 from heard_vehicle import Heard, parachute, stamped, state, vehicle
 
 from chute_ros.tools.chute.screen import Screen
-from chute_ros.tools.chute.status_text import Line
+from chute_ros.tools.chute.status_text import StatusLine
 from chute_ros.tools.chute.watch import essence
 from chute_ros.tools.chute.watch_text import Page, empty_page, page_of
 
@@ -45,7 +45,7 @@ def rows(sent):
 
 def test_the_state_is_in_large_and_the_rest_below_in_its_order(heard):
     page = page_of(heard.view())
-    assert page.banner == Line("I N   F L I G H T", "plain")
+    assert page.banner == StatusLine("I N   F L I G H T", "plain")
     assert not page.grey
     heads = [line.text for line in page.lines if line.tone == "head"]
     assert heads == [
@@ -114,7 +114,13 @@ def test_a_low_terminal_says_that_rows_are_missing(heard, screen, capsys, height
 
 def test_a_long_reason_is_wrapped_and_a_longer_one_is_cut(screen, capsys):
     long = "x" * 1000
-    screen.show(Page(Line("READY", "good"), (Line("word " * 20), Line(long), Line("end"))), 0.0)
+    screen.show(
+        Page(
+            StatusLine("READY", "good"),
+            (StatusLine("word " * 20), StatusLine(long), StatusLine("end")),
+        ),
+        0.0,
+    )
     shown = rows(capsys.readouterr().out)
     words = [row for row in shown.values() if "word" in row]
     assert [row.startswith("        word") for row in words] == [False, True]
@@ -124,8 +130,8 @@ def test_a_long_reason_is_wrapped_and_a_longer_one_is_cut(screen, capsys):
 
 
 def test_brackets_of_a_text_are_no_markup(screen, capsys):
-    line = Line("[x] tilt_deg 73.34 [red]or[/red] [/]")
-    screen.show(Page(Line("READY", "good"), (line,)), 0.0)
+    line = StatusLine("[x] tilt_deg 73.34 [red]or[/red] [/]")
+    screen.show(Page(StatusLine("READY", "good"), (line,)), 0.0)
     assert rows(capsys.readouterr().out)[4] == line.text
 
 

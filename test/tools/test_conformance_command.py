@@ -137,7 +137,7 @@ def test_with_the_word_it_fires() -> None:
     code, out, errors = Bench().run("--fire", "--only", "release", typed="FIRE\n")
     assert (code, errors) == (0, "")
     assert "release: IT RELEASES" in out
-    assert "passed         release              DRONE, told after" in out
+    assert "passed         release              DRONE, reported after" in out
 
 
 @contextmanager
@@ -188,7 +188,7 @@ def test_where_nobody_reads_on_the_device_is_left_disarmed(tmp_path: Path) -> No
         kit.wait(60.0)
         assert kit.stderr is not None
         errors = kit.stderr.read()
-    assert (kit.returncode, errors) == (3, "conformance: nobody reads what it tells\n")
+    assert (kit.returncode, errors) == (3, "conformance: nobody reads what it reports\n")
     assert report.exists()
 
 

@@ -12,12 +12,12 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.turn import Turn
 from chute_ros.tools.explore_properties import PROPERTIES
-from chute_ros.tools.explorer import BEGINNINGS, Explorer, Found, main, page
+from chute_ros.tools.explorer import BEGINNINGS, Exploration, Explorer, main, page
 
 ROOT = Path(__file__).parents[2]
 
 
-def found_from(*beginnings: str) -> Found:
+def found_from(*beginnings: str) -> Exploration:
     explorer = Explorer(ROOT)
     return explorer.explore(1, {name: BEGINNINGS[name] for name in beginnings})
 

@@ -24,7 +24,7 @@ from chute_ros.model import VTOL, Action
 from chute_ros.tools.judge_log import command, formats, table
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
-from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.judge_log.log_flight import JudgedLog
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
 
@@ -45,19 +45,19 @@ def fallen() -> list[Told]:
     return flown(FAILS, FAILS_AT + 5.0)
 
 
-def judged(path: Path, profile: str | None = None) -> Judged:
+def judged(path: Path, profile: str | None = None) -> JudgedLog:
     log = formats.read(path, {})
     return command.flown(log, command.config_of(log, profile))
 
 
 @pytest.fixture(scope="module")
-def fell(fallen: list[Told], tmp_path_factory) -> Callable[[str], Judged]:
+def fell(fallen: list[Told], tmp_path_factory) -> Callable[[str], JudgedLog]:
     """fell(name of a format): the flight whose motor fails, judged by that log."""
     folder = tmp_path_factory.mktemp("fell")
     return functools.cache(lambda name: judged(FORMATS[name](fallen, folder / name)))
 
 
-def highest(one: Judged) -> float:
+def highest(one: JudgedLog) -> float:
     return max(state.height for _, state in one.vehicle if math.isfinite(state.height))
 
 
@@ -244,7 +244,7 @@ def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
     with Writer(tmp_path / "other", version=9) as writer:
         topic = writer.add_connection("/temperature", kind, typestore=store)
         writer.write(topic, 10**9, store.serialize_cdr(store.types[kind](21.0), kind))
-    with pytest.raises(LogError, match="no topic tells a height"):
+    with pytest.raises(LogError, match="no topic reports a height"):
         formats.read(tmp_path / "other", {})
 
 
@@ -297,7 +297,7 @@ def test_a_rule_that_waits_for_nothing_is_told_without_a_counter(fell):
 
 
 @pytest.fixture(scope="module")
-def swept(fell) -> tuple[Judged, list[Tried]]:
+def swept(fell) -> tuple[JudgedLog, list[Tried]]:
     """One that falls, and what other thresholds, of few, would have made of it."""
     one = fell("flight.tlog")
     with pytest.MonkeyPatch.context() as monkeypatch:

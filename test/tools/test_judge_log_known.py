@@ -9,25 +9,25 @@ from log_bench import FAILS, FAILS_AT, FALLS_FROM, LANDED_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command, formats
-from chute_ros.tools.judge_log.findings import Verdict, verdict_of
+from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError, without_gaps
 from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
 
 HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
 
 
-def judged(path: Path) -> Verdict:
+def judged(path: Path) -> LogVerdict:
     log = formats.read(path, {})
     return verdict_of(command.flown(log, command.config_of(log, None)))
 
 
 @pytest.fixture(scope="module")
-def landed(tmp_path_factory) -> Verdict:
+def landed(tmp_path_factory) -> LogVerdict:
     return judged(tlog(flown(LANDS, LANDED_AT), tmp_path_factory.mktemp("logs") / "well.tlog"))
 
 
 @pytest.fixture(scope="module")
-def fallen(tmp_path_factory) -> Verdict:
+def fallen(tmp_path_factory) -> LogVerdict:
     told = flown(FAILS, FAILS_AT + 4.0)
     return judged(tlog(told, tmp_path_factory.mktemp("logs") / "fell.tlog"))
 

@@ -7,7 +7,7 @@ import pytest
 from chute_ros.errors import ParameterError
 from chute_ros.links.registered import vehicles
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
-from chute_ros.tools.launch_checks import FAILURES, Flight
+from chute_ros.tools.launch_checks import FAILURES, FlightArguments
 from chute_ros.tools.simulated_vehicle import own_folder, simulators_of
 
 DRONE, ROCKET = simulators_of("mavlink"), simulators_of("umbilical")
@@ -15,12 +15,12 @@ CALM = ["--at", "0:wind=0.5"]
 
 
 def test_one_that_stands_is_told_nothing_but_of_light_air():
-    assert Flight().options(DRONE) == {"sim_autopilot": CALM}
-    assert Flight().options(ROCKET) == {}
+    assert FlightArguments().options(DRONE) == {"sim_autopilot": CALM}
+    assert FlightArguments().options(ROCKET) == {}
 
 
 def test_a_flight_with_several_failures_is_a_script_of_each_simulator():
-    flight = Flight(fly="60", fail="refuse@0, motor@15,link@20.5", wind="5")
+    flight = FlightArguments(fly="60", fail="refuse@0, motor@15,link@20.5", wind="5")
     assert flight.options(DRONE) == {
         "sim_autopilot": [
             *("--at", "10:arm", "--at", "11:takeoff=60", "--at", "0:wind=5"),
@@ -31,7 +31,7 @@ def test_a_flight_with_several_failures_is_a_script_of_each_simulator():
 
 
 def test_a_rocket_is_launched():
-    flight = Flight(launch="12", fail="drogue@0,umbilical@3")
+    flight = FlightArguments(launch="12", fail="drogue@0,umbilical@3")
     assert flight.options(ROCKET) == {
         "sim_flight_computer": ["--at", "12:launch", "--at", "12:drogue-fails", "--at", "15:cut"]
     }
@@ -48,23 +48,29 @@ def test_each_failure_is_an_action_of_the_table_and_of_some_vehicle():
         assert able, word
         for name in able:
             begin = {"launch": "1"} if name == "umbilical" else {"fly": "60"}
-            assert Flight(**begin, fail=f"{word}@1").options(simulators_of(name))
+            assert FlightArguments(**begin, fail=f"{word}@1").options(simulators_of(name))
 
 
 MISTAKES = {
-    Flight(fly="high"): "fly is 'high': need a height from 1 to 500 (m), for example 60",
-    Flight(fly="0.5"): "fly is '0.5': need a height from 1 to 500 (m)",
-    Flight(fly="nan"): "fly is 'nan': need a height from 1 to 500 (m)",
-    Flight(wind="31"): "wind is '31': need a speed from 0 to 30 (m/s), for example 5",
-    Flight(wind="-1"): "wind is '-1': need a speed from 0 to 30 (m/s)",
-    Flight(fail="motor@5"): "fail is 'motor@5': need fly too, which it counts from",
-    Flight(fly="60", fail="motor"): "fail is 'motor': need one of motor, autopilot, telemetry, ",
-    Flight(fly="60", fail="motor@"): "@ and seconds after the take-off or launch from 0 to 3600",
-    Flight(fly="60", fail="motor@-1"): "fail is 'motor@-1': need one of ",
-    Flight(fly="60", fail="motor@inf"): "fail is 'motor@inf': need one of ",
-    Flight(fly="60", fail="engine@5"): "for example motor@15",
-    Flight(fly="60", fail="motor@5,drogue@1"): "fail is 'drogue@1': need one of motor, ",
-    Flight(launch="12"): "launch is '12': need a vehicle with sim_flight_computer; this one has "
+    FlightArguments(fly="high"): "fly is 'high': need a height from 1 to 500 (m), for example 60",
+    FlightArguments(fly="0.5"): "fly is '0.5': need a height from 1 to 500 (m)",
+    FlightArguments(fly="nan"): "fly is 'nan': need a height from 1 to 500 (m)",
+    FlightArguments(wind="31"): "wind is '31': need a speed from 0 to 30 (m/s), for example 5",
+    FlightArguments(wind="-1"): "wind is '-1': need a speed from 0 to 30 (m/s)",
+    FlightArguments(fail="motor@5"): "fail is 'motor@5': need fly too, which it counts from",
+    FlightArguments(
+        fly="60", fail="motor"
+    ): "fail is 'motor': need one of motor, autopilot, telemetry, ",
+    FlightArguments(
+        fly="60", fail="motor@"
+    ): "@ and seconds after the take-off or launch from 0 to 3600",
+    FlightArguments(fly="60", fail="motor@-1"): "fail is 'motor@-1': need one of ",
+    FlightArguments(fly="60", fail="motor@inf"): "fail is 'motor@inf': need one of ",
+    FlightArguments(fly="60", fail="engine@5"): "for example motor@15",
+    FlightArguments(fly="60", fail="motor@5,drogue@1"): "fail is 'drogue@1': need one of motor, ",
+    FlightArguments(
+        launch="12"
+    ): "launch is '12': need a vehicle with sim_flight_computer; this one has "
     "sim_autopilot, sim_mavlink_parachute",
 }
 
@@ -77,11 +83,17 @@ def test_a_mistake_names_the_argument_the_value_and_what_is_needed(flight):
 
 
 OF_A_ROCKET = {
-    Flight(launch="soon"): "launch is 'soon': need a time after the start from 0 to 3600 (s)",
-    Flight(fly="60"): "fly is '60': need a vehicle with sim_autopilot; this one has sim_flight_co",
-    Flight(wind="5"): "wind is '5': need a vehicle with sim_autopilot",
-    Flight(fail="drogue@5"): "fail is 'drogue@5': need launch too, which it counts from",
-    Flight(launch="5", fail="motor@5"): "fail is 'motor@5': need one of drogue, computer, ",
+    FlightArguments(
+        launch="soon"
+    ): "launch is 'soon': need a time after the start from 0 to 3600 (s)",
+    FlightArguments(
+        fly="60"
+    ): "fly is '60': need a vehicle with sim_autopilot; this one has sim_flight_co",
+    FlightArguments(wind="5"): "wind is '5': need a vehicle with sim_autopilot",
+    FlightArguments(fail="drogue@5"): "fail is 'drogue@5': need launch too, which it counts from",
+    FlightArguments(
+        launch="5", fail="motor@5"
+    ): "fail is 'motor@5': need one of drogue, computer, ",
 }
 
 

@@ -44,7 +44,7 @@ class Belief:
 
 
 @dataclass(frozen=True)
-class Order:
+class PeerDecision:
     """A decision. action: KILL (motors off), or DEPLOY (motors off, and a release after it)."""
 
     action: Action
@@ -58,7 +58,7 @@ class Peer(Protocol):
     #: From motors off to the release, s.
     release_delay: float
 
-    def step(self, belief: Belief) -> Order | None:
+    def step(self, belief: Belief) -> PeerDecision | None:
         """Look at what the autopilot believes now; called once at each of its steps."""
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from chute_ros.campaign.peers.ap_parachute import LOWEST, RELEASE_DELAY, SinkCheck
-from chute_ros.campaign.peers.api import Belief, Held, Order, Reasons, above, below
+from chute_ros.campaign.peers.api import Belief, Held, PeerDecision, Reasons, above, below
 from chute_ros.model import Action
 
 _GRAVITY = 9.80665  # m/s^2
@@ -45,7 +45,7 @@ class ArduCopter:
         self._acceleration = 0.0
         self._before = self._read_at = -math.inf
 
-    def step(self, belief: Belief) -> Order | None:
+    def step(self, belief: Belief) -> PeerDecision | None:
         """Look at what the autopilot believes now."""
         passed = min(belief.now - self._before, _LONGEST_LOOP)
         self._before = belief.now
@@ -60,9 +60,9 @@ class ArduCopter:
             return None
         if self._lost > 0.0 or belief.height >= LOWEST:
             if sinks:
-                return Order(Action.DEPLOY, "critical sink", sinks)
+                return PeerDecision(Action.DEPLOY, "critical sink", sinks)
             if lost := self._loses_control(error, passed):
-                return Order(Action.DEPLOY, "loss of control", lost)
+                return PeerDecision(Action.DEPLOY, "loss of control", lost)
         return self._crash(belief, error)
 
     def _read_barometer(self, belief: Belief) -> None:
@@ -90,7 +90,7 @@ class ArduCopter:
             below("pressure", self._pressure_height, self._lost_at),
         )
 
-    def _crash(self, belief: Belief, error: float) -> Order | None:
+    def _crash(self, belief: Belief, error: float) -> PeerDecision | None:
         crashed = (
             abs(self._acceleration) < _CRASH_ACCELERATION
             and abs(belief.tilt) > _CRASH_LEAN
@@ -103,4 +103,4 @@ class ArduCopter:
             above("attitude_error", error, _CRASH_ANGLE),
             above("tilt_deg", abs(belief.tilt), _CRASH_LEAN),
         )
-        return Order(Action.KILL, "crash", reasons)
+        return PeerDecision(Action.KILL, "crash", reasons)

@@ -7,7 +7,7 @@ release that a person orders.
 from __future__ import annotations
 
 from chute_ros.campaign.peers.ap_parachute import RELEASE_DELAY, SinkCheck
-from chute_ros.campaign.peers.api import Belief, Order
+from chute_ros.campaign.peers.api import Belief, PeerDecision
 from chute_ros.model import Action
 
 
@@ -19,10 +19,10 @@ class ArduPlane:
     def __init__(self, critical_sink: float = 0.0, scale: float = 1.0) -> None:
         self._sink = SinkCheck(critical_sink, scale)
 
-    def step(self, belief: Belief) -> Order | None:
+    def step(self, belief: Belief) -> PeerDecision | None:
         """Look at what the autopilot believes now."""
         # Its is_flying() asks for an armed vehicle as well.
         reasons = self._sink.reasons(belief)
         if not reasons or not belief.armed:
             return None
-        return Order(Action.DEPLOY, "critical sink", reasons)
+        return PeerDecision(Action.DEPLOY, "critical sink", reasons)

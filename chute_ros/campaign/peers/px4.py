@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from chute_ros.campaign.peers.api import Belief, Held, Order, Reasons, above
+from chute_ros.campaign.peers.api import Belief, Held, PeerDecision, Reasons, above
 from chute_ros.model import Action
 
 #: FD_FAIL_R and FD_FAIL_P, degrees, and FD_FAIL_R_TTRI and FD_FAIL_P_TTRI, s: defaults.
@@ -34,13 +34,13 @@ class Px4:
         #: The most that it has had since it came below what is commanded, m; NaN: it is not below.
         self._best = math.nan
 
-    def step(self, belief: Belief) -> Order | None:
+    def step(self, belief: Belief) -> PeerDecision | None:
         """Look at what the autopilot believes now."""
         reasons = (*self._tilted(belief), *self._lost_altitude(belief))
         if not reasons or not belief.armed:
             return None
         early = belief.armed_for < _EARLY
-        return Order(Action.KILL if early else Action.DEPLOY, "failure detector", reasons)
+        return PeerDecision(Action.KILL if early else Action.DEPLOY, "failure detector", reasons)
 
     def _tilted(self, belief: Belief) -> Reasons:
         tilts = not belief.acro and abs(belief.tilt) > self._angle

@@ -9,7 +9,7 @@ Height and delay as ArduPilot (CHUTE_ALT_MIN, CHUTE_DELAY_MS).
 from __future__ import annotations
 
 from chute_ros.campaign.peers.ap_parachute import LOWEST, RELEASE_DELAY
-from chute_ros.campaign.peers.api import Belief, Held, Order, Reasons, above, below
+from chute_ros.campaign.peers.api import Belief, Held, PeerDecision, Reasons, above, below
 from chute_ros.model import Action
 
 _TILT, _TILT_OF_A_WING, _SINK, _TIME = 60.0, 80.0, 10.0, 0.5
@@ -25,7 +25,7 @@ class Threshold:
         self._sink, self._time = _SINK * scale, _TIME * scale
         self._tilts, self._sinks = Held(), Held()
 
-    def step(self, belief: Belief) -> Order | None:
+    def step(self, belief: Belief) -> PeerDecision | None:
         """Look at what the autopilot believes now."""
         tilt, speed, now = abs(belief.tilt), belief.vertical_speed, belief.now
         flies = belief.armed and not belief.landed and belief.height >= LOWEST
@@ -38,4 +38,4 @@ class Threshold:
             reasons = (above("tilt_deg", tilt, self._tilt),)
         if sinks:
             reasons = (*reasons, below("vertical_speed", speed, -self._sink))
-        return Order(Action.DEPLOY, "threshold", reasons)
+        return PeerDecision(Action.DEPLOY, "threshold", reasons)

@@ -28,7 +28,7 @@ READABLE = (
 
 
 @dataclass(frozen=True)
-class Details:
+class MavlinkDetails:
     """A picture of the link, made in its thread and read in the executor's."""
 
     doubts: tuple[str, ...]
@@ -42,10 +42,10 @@ class Details:
     kill: Task
 
 
-def details_of(link: MavlinkLink, now: float) -> Details:
+def details_of(link: MavlinkLink, now: float) -> MavlinkDetails:
     """In the link's turn: all that the tasks say."""
     refused = link.parachutes.refused_count + link.autopilots.refused_count
-    return Details(
+    return MavlinkDetails(
         tuple(link.doubts(now)),
         link.received_count,
         link.sent_count,
@@ -62,7 +62,10 @@ def details_of(link: MavlinkLink, now: float) -> Details:
 
 
 def link_task(
-    name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
+    name: str,
+    details: MavlinkDetails,
+    traffic: Mapping[str, object],
+    wire: diagnostics.WirePicture,
 ) -> DiagnosticStatus:
     """The wire, and what was dropped on it."""
     values = {**traffic, **details.useless}
@@ -71,7 +74,7 @@ def link_task(
     )
 
 
-def tasks(name: str, details: Details, expects_parachute: bool) -> list[DiagnosticStatus]:
+def tasks(name: str, details: MavlinkDetails, expects_parachute: bool) -> list[DiagnosticStatus]:
     """Each parachute of ours, the autopilot on the same network, and how it is killed."""
     parachutes = details.parachutes
     if not parachutes and expects_parachute:

@@ -17,7 +17,7 @@ from chute_msgs.srv import (
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
-from chute_ros.links.mavlink.diagnostics import Details, details_of, link_task, tasks
+from chute_ros.links.mavlink.diagnostics import MavlinkDetails, details_of, link_task, tasks
 from chute_ros.links.mavlink.parameters import PARAMETERS, MavlinkParameters
 from chute_ros.links.mavlink.protocol.goals import impossible_masks
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
@@ -69,7 +69,7 @@ class MavlinkParachuteNode(DeviceNode):
 
     # -- what DeviceNode asks for ---------------------------------------------------------------
 
-    def _details(self, link: MavlinkLink, now: float) -> Details:
+    def _details(self, link: MavlinkLink, now: float) -> MavlinkDetails:
         self._signing.keep(now)
         return details_of(link, now)
 

@@ -12,7 +12,7 @@ from chute_ros.ros import diagnostics
 
 
 @dataclass(frozen=True)
-class Details:
+class RelayDetails:
     """A picture of the link, made in its thread and read in the executor's."""
 
     state: LinkState
@@ -21,13 +21,13 @@ class Details:
     fired_ago: float
 
 
-def details_of(link: RelayLink, now: float) -> Details:
+def details_of(link: RelayLink, now: float) -> RelayDetails:
     """In the link's turn: all that the task below says."""
-    return Details(link.state, link.received, link.fired, now - link.fired_at)
+    return RelayDetails(link.state, link.received, link.fired, now - link.fired_at)
 
 
 def link_task(
-    node: str, one: Details, wire: diagnostics.WirePicture, not_written: int
+    node: str, one: RelayDetails, wire: diagnostics.WirePicture, not_written: int
 ) -> DiagnosticStatus:
     """The output: whether it can be written is all that can be known."""
     level, text = diagnostics.ERROR, wire.text
@@ -43,8 +43,8 @@ def link_task(
     return diagnostics.status(node, "link", level, text, values, wire.connection)
 
 
-def parachute_task(node: str, one: Details) -> DiagnosticStatus:
+def parachute_task(node: str, one: RelayDetails) -> DiagnosticStatus:
     """The parachute. It is never OK."""
-    text = "UNMONITORED: a relay output tells nothing of its parachute"
+    text = "UNMONITORED: a relay output reports nothing of its parachute"
     values = {"times fired": one.fired, "fired (s ago)": one.fired_ago}
     return diagnostics.status(node, "parachute", diagnostics.WARN, text, values, "")

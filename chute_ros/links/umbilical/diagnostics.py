@@ -32,7 +32,7 @@ READABLE = (
 
 
 @dataclass(frozen=True)
-class Details:
+class UmbilicalDetails:
     """A picture of the link, made in its thread and read in the executor's. work: a dump or a wipe
     that is under way, in words."""
 
@@ -46,11 +46,11 @@ class Details:
     work: str
 
 
-def details_of(link: UmbilicalLink, now: float) -> Details:
+def details_of(link: UmbilicalLink, now: float) -> UmbilicalDetails:
     """In the link's turn: all that the tasks say."""
     layout = link.decoder.layout
     scheduler = link.scheduler
-    return Details(
+    return UmbilicalDetails(
         link.received_bytes,
         link.computer.records,
         "not recognised yet" if layout is None else layout.name,
@@ -63,7 +63,10 @@ def details_of(link: UmbilicalLink, now: float) -> Details:
 
 
 def port_task(
-    name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
+    name: str,
+    details: UmbilicalDetails,
+    traffic: Mapping[str, object],
+    wire: diagnostics.WirePicture,
 ) -> DiagnosticStatus:
     """The port, and what was dropped on it."""
     received, records = details.received, details.records
@@ -79,7 +82,9 @@ def port_task(
     return diagnostics.wire_task(name, wire, troubles, received, values, details.dropped, READABLE)
 
 
-def memory_task(name: str, details: Details, progress: events.Progress) -> DiagnosticStatus:
+def memory_task(
+    name: str, details: UmbilicalDetails, progress: events.WorkProgress
+) -> DiagnosticStatus:
     """A dump or a wipe that is under way. progress: the newest."""
     text = details.work or "no dump or wipe under way"
     level = diagnostics.WARN if details.work else diagnostics.OK

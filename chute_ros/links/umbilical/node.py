@@ -53,7 +53,7 @@ class UmbilicalNode(DeviceNode):
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
         )
-        self._progress = events.Progress("", 0, 0)
+        self._progress = events.WorkProgress("", 0, 0)
         # The flight computer's own log, told apart from ours by the logger's name.
         its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
@@ -68,7 +68,7 @@ class UmbilicalNode(DeviceNode):
         for kind, follower in (
             (events.TelemetryReceived, self._telemetry),
             (LogLine, lambda one, at: log_notice(its_log, Notice(one.severity, one.text))),
-            (events.Progress, self._progressed),
+            (events.WorkProgress, self._progressed),
             (events.DumpData, lambda one, at: self.files.write(one.data)),
             (events.DumpStarted, self._dump_started),
             (events.DumpFinished, self._dump_finished),
@@ -90,7 +90,7 @@ class UmbilicalNode(DeviceNode):
         received = self.wall_at(event.record.received)
         self._telem_publisher.publish(telem(event.record, event.sequence, received))
 
-    def _progressed(self, event: events.Progress, stamp: Time) -> None:
+    def _progressed(self, event: events.WorkProgress, stamp: Time) -> None:
         self._progress = event
         self.get_logger().info(event.text, throttle_duration_sec=1.0)
 

@@ -10,17 +10,17 @@ from chute_ros.links.api import (
     Sockets,
     VehicleKind,
 )
+from chute_ros.links.upf.protocol.parameters import AUTOMATIC
 
 _FOLDER = "chute_ros.links.upf"
 _NAME = "upf_can"
 _BOTH = [AUTOPILOT_LINK, _NAME]
-#: As a controller is delivered it takes off, arms, disarms and lands by itself, and refuses to be
-#: told to: safety/arm would never succeed.
-_BY_ITSELF = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "Enable Auto-Land")
 
 
 def _simulators(vehicle: VehicleKind, sockets: Sockets) -> tuple[tuple[str, ...], ...]:
-    by_command = [part for name in _BY_ITSELF for part in ("--parameter", f"{name}=false")]
+    # As a controller is delivered it takes off, arms, disarms and lands by itself, and refuses to
+    # be told to: safety/arm would never succeed.
+    by_command = [part for name in AUTOMATIC for part in ("--parameter", f"{name}=false")]
     feels = ("--vehicle", f"udpout:{sockets.air}")
     return (("sim_upf", "--connection", sockets.bus, *feels, *by_command),)
 

@@ -33,7 +33,7 @@ READABLE = (
 
 
 @dataclass(frozen=True)
-class Details:
+class UpfDetails:
     """A picture of the link, made in its thread and read in the executor's."""
 
     troubles: tuple[str, ...]
@@ -48,14 +48,14 @@ class Details:
     allocation_left_to: int
 
 
-def details_of(link: UpfLink, now: float) -> Details:
+def details_of(link: UpfLink, now: float) -> UpfDetails:
     """In the link's turn: all that the tasks say."""
     bus = link.bus
     nodes = {
         f"node {node.node_id}": f"{node.name or 'not known'} {node.unique_id.hex()}".strip()
         for node in bus.nodes.all()
     }
-    return Details(
+    return UpfDetails(
         troubles=tuple(bus.troubles()),
         received=bus.endpoint.received_count,
         sent=bus.endpoint.sent_count,
@@ -75,7 +75,7 @@ def details_of(link: UpfLink, now: float) -> Details:
 
 
 def bus_task(
-    name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
+    name: str, details: UpfDetails, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The bus, who is on it, and what was dropped on it."""
     values = {**traffic, **details.bus}
@@ -84,7 +84,7 @@ def bus_task(
     )
 
 
-def allocation_task(name: str, details: Details, path: str) -> DiagnosticStatus:
+def allocation_task(name: str, details: UpfDetails, path: str) -> DiagnosticStatus:
     """The node ids given out."""
     level = diagnostics.WARN if details.refusal else diagnostics.OK
     text = details.refusal or f"{len(details.given)} node ids given out"

@@ -23,7 +23,7 @@ from chute_ros.model import (
     ParachuteStatus,
     VehicleState,
 )
-from chute_ros.protocol.events import Ask, AskSupervisor, Notice, Severity, failed_request
+from chute_ros.protocol.events import AskSupervisor, Notice, SafetyAsk, Severity, failed_request
 from chute_ros.protocol.goal import EffectFinished
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
@@ -125,7 +125,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
     def event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
             text = f"{event.device} requests {event.ask.name} from the supervisor: {event.reason}"
-            lets_go = event.ask is Ask.FLIGHT_BLOCK_RELEASE
+            lets_go = event.ask is SafetyAsk.FLIGHT_BLOCK_RELEASE
             self.shell.log(Notice(Severity.INFO if lets_go else Severity.WARNING, text))
         elif isinstance(event, BusRequestFinished):
             self.desk.finished(event.token, event)

@@ -16,11 +16,11 @@ from chute_ros.protocol.dronecan import allocation, time_sync
 from chute_ros.protocol.dronecan.allocation import UNIQUE_ID_LENGTH, Allocator
 from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits, SendCall
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
 from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 from chute_ros.protocol.dronecan.scripts import Script, Scripts
 from chute_ros.protocol.dronecan.time_sync import TimeMaster
-from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, TransferKind
 from chute_ros.protocol.events import EventLog, Severity
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
@@ -95,19 +95,19 @@ class BusNode(EventLog):
         """We may seem alive until this time: a hung owner must look dead from outside."""
         self._alive_until = until
 
-    def receive(self, data: bytes, now: float) -> Heard | None:
+    def receive(self, data: bytes, now: float) -> ReceivedTransfer | None:
         """Bytes of a frame came; what the owner should know of, or None."""
         heard = self.endpoint.receive(data, now)
         if heard is None:
             return None
-        if heard.kind is Kind.RESPONSE:
+        if heard.kind is TransferKind.RESPONSE:
             if heard.name.startswith("uavcan."):
                 self.scripts.calls.response(
                     heard.source, heard.name, heard.transfer_id, heard.values, now
                 )
                 self._drive(now)
                 return None
-        elif heard.kind is Kind.REQUEST:
+        elif heard.kind is TransferKind.REQUEST:
             if heard.name.startswith("uavcan."):
                 self._serve(heard, now)
                 return None
@@ -208,7 +208,7 @@ class BusNode(EventLog):
         except MessageError as error:
             self.scripts.calls.unsendable(send, str(error), now)
 
-    def _serve(self, request: Heard, now: float) -> None:
+    def _serve(self, request: ReceivedTransfer, now: float) -> None:
         """The standard services of ours."""
         if request.name == GET_NODE_INFO:
             self.endpoint.respond(request, self._information(now))
@@ -236,7 +236,7 @@ class BusNode(EventLog):
             "name": self.config.name.encode(),
         }
 
-    def _allocation(self, heard: Heard, now: float) -> None:
+    def _allocation(self, heard: ReceivedTransfer, now: float) -> None:
         if not self.config.allocator:
             return
         # Every node has spoken once by then, whatever its id.

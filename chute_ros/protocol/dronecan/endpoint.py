@@ -9,14 +9,20 @@ from typing import Any
 
 from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, Assembler, Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import (
+    TRANSFER_IDS,
+    Assembler,
+    Transfer,
+    TransferKind,
+    frames_of,
+)
 
 
 @dataclass(frozen=True)
-class Heard:
+class ReceivedTransfer:
     """A message, request or response for us. source 0: anonymous."""
 
-    kind: Kind
+    kind: TransferKind
     name: str
     source: int
     transfer_id: int
@@ -41,7 +47,7 @@ class Endpoint:
         self._next_ids: dict[str, int] = {}
         self._output: list[bytes] = []
 
-    def receive(self, data: bytes, now: float) -> Heard | None:
+    def receive(self, data: bytes, now: float) -> ReceivedTransfer | None:
         """Bytes of one frame came; what it completes, or None."""
         came = self._assembler.feed(data, self.node_id, now)
         if came is None:
@@ -61,14 +67,14 @@ class Endpoint:
         if values is None:
             self.counts[f"{data_type.name} too short"] += 1
             return None
-        return Heard(came.kind, data_type.name, came.source, came.transfer_id, values)
+        return ReceivedTransfer(came.kind, data_type.name, came.source, came.transfer_id, values)
 
     def broadcast(self, name: str, values: Mapping[str, Any], priority: int = 16) -> None:
         """Send a message."""
         data_type = self.types.message(name)
         number = self._next_ids.get(name, 0)
         payload = data_type.encode(values)
-        kind, source = Kind.MESSAGE, self.node_id
+        kind, source = TransferKind.MESSAGE, self.node_id
         transfer = Transfer(kind, data_type.id, source, 0, number, payload, priority)
         discriminator = 0
         if not source:
@@ -84,11 +90,19 @@ class Endpoint:
         data_type = self.types.request(service)
         payload = data_type.encode(values)
         transfer = Transfer(
-            Kind.REQUEST, data_type.id, self.node_id, server, transfer_id, payload, priority
+            TransferKind.REQUEST,
+            data_type.id,
+            self.node_id,
+            server,
+            transfer_id,
+            payload,
+            priority,
         )
         self._send(transfer, data_type.base_crc)
 
-    def respond(self, request: Heard, values: Mapping[str, Any], priority: int = 16) -> None:
+    def respond(
+        self, request: ReceivedTransfer, values: Mapping[str, Any], priority: int = 16
+    ) -> None:
         """Answer a request."""
         self.respond_to(request.source, request.name, request.transfer_id, values, priority)
 
@@ -104,7 +118,13 @@ class Endpoint:
         data_type = self.types.response(service)
         payload = data_type.encode(values)
         transfer = Transfer(
-            Kind.RESPONSE, data_type.id, self.node_id, client, transfer_id, payload, priority
+            TransferKind.RESPONSE,
+            data_type.id,
+            self.node_id,
+            client,
+            transfer_id,
+            payload,
+            priority,
         )
         self._send(transfer, data_type.base_crc)
 

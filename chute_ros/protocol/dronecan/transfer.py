@@ -39,7 +39,7 @@ _REMEMBERED = 8
 _NODE_STATUS = 341
 
 
-class Kind(enum.Enum):
+class TransferKind(enum.Enum):
     """What a transfer is; the value is how data types name its direction."""
 
     MESSAGE = None
@@ -51,7 +51,7 @@ class Kind(enum.Enum):
 class Transfer:
     """A complete transfer. source 0: anonymous. destination 0: everybody (messages)."""
 
-    kind: Kind
+    kind: TransferKind
     type_id: int
     source: int
     destination: int
@@ -83,7 +83,7 @@ def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list
 
 
 def _check(transfer: Transfer) -> None:
-    service = transfer.kind is not Kind.MESSAGE
+    service = transfer.kind is not TransferKind.MESSAGE
     anonymous = transfer.source == 0
     for name, value, low, high in (
         ("priority", transfer.priority, 0, _HIGHEST_PRIORITY),
@@ -98,8 +98,8 @@ def _check(transfer: Transfer) -> None:
 
 def _identifier(transfer: Transfer, discriminator: int) -> int:
     common_part = transfer.priority << 24 | transfer.source
-    if transfer.kind is not Kind.MESSAGE:
-        request = transfer.kind is Kind.REQUEST
+    if transfer.kind is not TransferKind.MESSAGE:
+        request = transfer.kind is TransferKind.REQUEST
         service = transfer.type_id << 16 | request << 15 | transfer.destination << 8 | 0x80
         return common_part | service
     if transfer.source == 0:
@@ -114,11 +114,11 @@ def head_of(frame: CanFrame, payload: bytes = b"") -> Transfer:
     priority, source = identifier >> 24 & 0x1F, identifier & 0x7F
     transfer_id = frame.data[-1] % TRANSFER_IDS
     if identifier & 0x80:
-        kind = Kind.REQUEST if identifier & 0x8000 else Kind.RESPONSE
+        kind = TransferKind.REQUEST if identifier & 0x8000 else TransferKind.RESPONSE
         type_id, destination = identifier >> 16 & 0xFF, identifier >> 8 & 0x7F
         return Transfer(kind, type_id, source, destination, transfer_id, payload, priority)
     type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
-    return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, payload, priority)
+    return Transfer(TransferKind.MESSAGE, type_id, source, 0, transfer_id, payload, priority)
 
 
 @dataclass
@@ -151,7 +151,7 @@ class _Session:
         return 0 < behind <= _REMEMBERED and now - at < _OVERTAKEN
 
 
-_SessionKey = tuple[Kind, int, int, int]
+_SessionKey = tuple[TransferKind, int, int, int]
 
 
 class Assembler:
@@ -178,7 +178,7 @@ class Assembler:
         head = head_of(frame)
         if head.destination not in (0, node_id):
             return None
-        if head.kind is not Kind.MESSAGE and 0 in (head.source, head.destination):
+        if head.kind is not TransferKind.MESSAGE and 0 in (head.source, head.destination):
             return self._drop("services from or to nobody")
         if self._types.by_id(head.type_id, head.kind.value) is None:
             return self._drop("transfers of unknown types")
@@ -203,7 +203,7 @@ class Assembler:
                 anew = newest and tail & END and session.said not in (b"", chunk)
                 if not anew:
                     return self._drop("duplicate transfers")
-            tells_a_state = head.kind is Kind.MESSAGE and head.type_id != _NODE_STATUS
+            tells_a_state = head.kind is TransferKind.MESSAGE and head.type_id != _NODE_STATUS
             if tells_a_state and session.is_old_news(head.transfer_id, now):
                 return self._drop("messages that a newer one has overtaken")
             if tail & TOGGLE:

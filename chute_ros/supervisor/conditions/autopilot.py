@@ -28,7 +28,7 @@ class AutopilotFact(enum.Enum):
     """What can be true of the autopilot."""
 
     LOST = "lost"  # vehicle/state, or the autopilot behind it, is silent
-    REBOOTED = "rebooted"  # it started anew in flight
+    REBOOTED = "rebooted"  # it restarted in flight
     DISARMED = "disarmed"  # it says that the motors are off
     EMERGENCY = "emergency"  # it says MAV_STATE_EMERGENCY or MAV_STATE_FLIGHT_TERMINATION
     #: We stopped its motors in the air, so long ago that it still falls, and nothing tells how.
@@ -98,7 +98,7 @@ def _rebooted(config: SupervisorConfig, state: State, now: float) -> Finding:
 def _lost(config: SupervisorConfig, state: State, now: float) -> Finding:
     silence, limit = now - state.heard.vehicle_received, config.vehicle_state_age
     if math.isnan(silence):
-        return Finding(None, lambda: "autopilot never heard")
+        return Finding(None, lambda: "vehicle/state never received")
     link = state.heard.vehicle.link_state
     return Finding(
         silence > limit or link is LinkState.LOST,
@@ -116,7 +116,7 @@ def _killed_aloft(config: SupervisorConfig, state: State, now: float) -> Finding
         left >= minimum and silent,
         lambda: (
             f"killed aloft {now - state.killing.killed_at:.2f} s ago, at least {left:.1f} m are "
-            f"left (minimum {minimum:g} m), and {'nothing' if silent else 'something'} tells "
+            f"left (minimum {minimum:g} m), and {'nothing' if silent else 'something'} reports "
             "whether it falls"
         ),
     )

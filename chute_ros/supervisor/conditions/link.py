@@ -62,7 +62,7 @@ class LinkCondition(Condition):
             told = [
                 f"{name} is still starting"
                 if starting
-                else f"{name} is {judged.name}, heard {now - heard:.2f} s ago"
+                else f"{name} is {judged.name}, last received {now - heard:.2f} s ago"
                 for name, judged, starting, heard in looks
             ]
             wanted = " or ".join(judgement.name for judgement in self.judged)

@@ -9,8 +9,8 @@ from std_srvs.srv import Trigger
 
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.errors import CommandError
-from chute_ros.tools.chute.order import Answer, Order, not_answered
-from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.order import Order, ServiceAnswer, not_answered
+from chute_ros.tools.chute.session import ChuteSession
 from chute_ros.tools.person_record import PersonRecord
 
 #: Type of a service, by Order.kind.
@@ -19,11 +19,11 @@ KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
-class Call:
+class OrderCall:
     """One order. Made first, so that its service, and who keeps the record, are found while the
     vehicle is listened to. who: gives it."""
 
-    def __init__(self, session: Session, order: Order, who: str) -> None:
+    def __init__(self, session: ChuteSession, order: Order, who: str) -> None:
         self._session, self._order, self._who = session, order, who
         self._record = PersonRecord(session.node, "chute", "safety/person")
         self._kind = KINDS[order.kind]
@@ -33,7 +33,7 @@ class Call:
         """Its service is there."""
         return bool(self._client.service_is_ready())
 
-    def send(self, seconds: float) -> Answer:
+    def send(self, seconds: float) -> ServiceAnswer:
         """The answer; CommandError if the service is gone, or does not answer within seconds."""
         if not self.found():
             text = f"{self._order.name}: {self._order.service} is gone: nothing was sent"
@@ -45,7 +45,9 @@ class Call:
             text = not_answered(self._order, f"within {seconds:g} s")
             raise CommandError(text, {"sent": True, "answered": False})
         message = with_plain_texts(future.result())
-        answer = Answer(message.success, message.message, getattr(message, "accepted", None))
+        answer = ServiceAnswer(
+            message.success, message.message, getattr(message, "accepted", None)
+        )
         recorded.answered(answer)
         self._record.leave()
         return answer

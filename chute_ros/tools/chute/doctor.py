@@ -16,7 +16,7 @@ from chute_ros.tools.chute.doctor_computer import (
 )
 from chute_ros.tools.chute.doctor_ports import port_findings
 from chute_ros.tools.chute.errors import CommandError
-from chute_ros.tools.chute.finding import WRONG, Finding, finding_lines, worst_first
+from chute_ros.tools.chute.finding import WRONG, DoctorFinding, finding_lines, worst_first
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
@@ -37,9 +37,9 @@ def main(chosen: Chosen) -> int:
             folder = folder_of(file) if file and folder_of(file).is_dir() else None
         except ImportError as error:
             remedy = "build both packages (`make build`, or `colcon build`) and source the result"
-            found.append(Finding(WRONG, f"cannot be imported: {error}", remedy))
+            found.append(DoctorFinding(WRONG, f"cannot be imported: {error}", remedy))
         except CommandError as error:
-            found.append(Finding(WRONG, str(error), "see docs/guide/first_flight.md"))
+            found.append(DoctorFinding(WRONG, str(error), "see docs/guide/first_flight.md"))
     of_computer = versions(around, fast_dds())
     found += [disk_finding(folder), version_finding(of_computer)]
     told = worst_first(found)

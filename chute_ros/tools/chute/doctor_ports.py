@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chute_ros.errors import ParameterError
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.finding import NOTE, OK, WRONG, Finding
+from chute_ros.tools.chute.finding import NOTE, OK, WRONG, DoctorFinding
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.serial_wire import explain, find_usb_port
 
@@ -19,20 +19,20 @@ _PATTERNS = ("ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*")
 
 def connection_finding(
     node: str, connection: str, link: Task | None, look: Callable[[str], str]
-) -> Finding:
+) -> DoctorFinding:
     """A node's parameter connection. link: what the node itself says of its wire, from whatever
     computer; look: what is wrong with it here."""
     name = f"connection {connection} of {node}"
     if link is not None and link.level != "ERROR":
-        return Finding(OK, f"{name}: {link.message}")
+        return DoctorFinding(OK, f"{name}: {link.message}")
     here = look(connection)
     remedy = f"if {node} runs on another computer, look there"
     if link is not None:
         told = f"{name}: {link.message}"
-        return Finding(
+        return DoctorFinding(
             WRONG, told, f"here: {here}; {remedy}" if here else "docs/guide/ has its settings"
         )
-    return Finding(WRONG, f"{name}: {here}", remedy) if here else Finding(OK, name)
+    return DoctorFinding(WRONG, f"{name}: {here}", remedy) if here else DoctorFinding(OK, name)
 
 
 def trouble_here(connection: str) -> str:
@@ -54,12 +54,12 @@ def trouble_here(connection: str) -> str:
     return _port_trouble(path)
 
 
-def port_findings(folder: Path = Path("/dev")) -> list[Finding]:
+def port_findings(folder: Path = Path("/dev")) -> list[DoctorFinding]:
     """Serial ports here that this user may not open."""
     found = []
     for path in sorted(one for pattern in _PATTERNS for one in folder.glob(pattern)):
         if trouble := _port_trouble(str(path)):
-            found.append(Finding(NOTE, f"serial port {path}", trouble))
+            found.append(DoctorFinding(NOTE, f"serial port {path}", trouble))
     return found
 
 

@@ -10,7 +10,7 @@ _WORST_FIRST = (WRONG, NOTE, OK)
 
 
 @dataclass(frozen=True)
-class Finding:
+class DoctorFinding:
     """level: WRONG needs its remedy, NOTE is good to know, OK is as it should be."""
 
     level: str
@@ -18,12 +18,12 @@ class Finding:
     remedy: str = ""
 
 
-def worst_first(findings: Sequence[Finding]) -> list[Finding]:
+def worst_first(findings: Sequence[DoctorFinding]) -> list[DoctorFinding]:
     """Those of one level in the order in which they were found."""
     return sorted(findings, key=lambda one: _WORST_FIRST.index(one.level))
 
 
-def finding_lines(findings: Sequence[Finding]) -> list[str]:
+def finding_lines(findings: Sequence[DoctorFinding]) -> list[str]:
     """For a terminal."""
     return [
         f"{one.level:<6} {one.what}" + (f" -> {one.remedy}" if one.remedy else "")

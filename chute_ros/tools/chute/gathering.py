@@ -11,15 +11,17 @@ from diagnostic_msgs.msg import DiagnosticArray
 from chute_ros.ros import qos
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.diagnostic_tasks import DiagnosticTasks, Task, silent_task
-from chute_ros.tools.chute.hearing import Picture
+from chute_ros.tools.chute.hearing import ReceivedMessages
 from chute_ros.tools.chute.listening import Listening
-from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.session import ChuteSession
 
 #: After the first word others come that nobody names: of a node without a heartbeat, s.
 _ALL_WITHIN = 2.2
 
 
-def gather(session: Session, seconds: float, listening: Listening | None = None) -> list[Task]:
+def gather(
+    session: ChuteSession, seconds: float, listening: Listening | None = None
+) -> list[Task]:
     """The tasks of this vehicle, worst first; empty: none came within seconds. A node that should
     send some, and sent none within seconds, has one that says so. listening: to the vehicle."""
     tasks = DiagnosticTasks(session.namespace)
@@ -49,7 +51,7 @@ def gather(session: Session, seconds: float, listening: Listening | None = None)
     return [*_silent_tasks(session, silent(), seconds), *found] if found else []
 
 
-def expected(picture: Picture) -> set[str]:
+def expected(picture: ReceivedMessages) -> set[str]:
     """The nodes that the vehicle should have: its supervisor and the links that this one names,
     and all that send heartbeats."""
     heard = picture.state(time.monotonic())
@@ -57,6 +59,6 @@ def expected(picture: Picture) -> set[str]:
     return named | picture.heartbeats.keys()
 
 
-def _silent_tasks(session: Session, nodes: Iterable[str], seconds: float) -> list[Task]:
+def _silent_tasks(session: ChuteSession, nodes: Iterable[str], seconds: float) -> list[Task]:
     prefix = f"{session.namespace}/".lstrip("/")
     return [silent_task(f"{prefix}{node}", seconds) for node in sorted(nodes)]

@@ -30,7 +30,7 @@ def stamp_seconds(message: Any) -> float:
 
 
 @dataclass(frozen=True)
-class Heard:
+class ReceivedMessage:
     """A message; when it was received, monotonic s and Unix s; the how-manieth it is of its kind
     and sender, from 1 on; and when the first of those was received, monotonic s, NaN: not kept."""
 
@@ -42,21 +42,21 @@ class Heard:
 
 
 @dataclass
-class Picture:
+class ReceivedMessages:
     """All that was received of one vehicle. began: when its first state was, monotonic s."""
 
     began: float = math.nan
     #: By the supervisor's name; by link; by link and device.
-    states: dict[str, Heard] = field(default_factory=dict)
-    heartbeats: dict[str, Heard] = field(default_factory=dict)
-    parachutes: dict[tuple[str, str], Heard] = field(default_factory=dict)
-    vehicle: Heard | None = None
+    states: dict[str, ReceivedMessage] = field(default_factory=dict)
+    heartbeats: dict[str, ReceivedMessage] = field(default_factory=dict)
+    parachutes: dict[tuple[str, str], ReceivedMessage] = field(default_factory=dict)
+    vehicle: ReceivedMessage | None = None
     #: (epoch, id) -> each decision once, though it is resent; of kills and deploys, and of flight
     #: blocks, the newest: apart, so that no blocks push a kill out.
-    fired: dict[tuple[int, int], Heard] = field(default_factory=dict)
-    blocks: dict[tuple[int, int], Heard] = field(default_factory=dict)
+    fired: dict[tuple[int, int], ReceivedMessage] = field(default_factory=dict)
+    blocks: dict[tuple[int, int], ReceivedMessage] = field(default_factory=dict)
     #: (epoch, id, link) -> the newest report of that link on that decision.
-    reports: dict[tuple[int, int, str], Heard] = field(default_factory=dict)
+    reports: dict[tuple[int, int, str], ReceivedMessage] = field(default_factory=dict)
     _ahead: dict[str, deque[float]] = field(default_factory=dict)
 
     def hear_state(self, message: Any, now: float, wall: float) -> None:
@@ -81,12 +81,12 @@ class Picture:
 
     def hear_vehicle(self, message: Any, now: float, wall: float) -> None:
         """vehicle/state."""
-        self.vehicle = Heard(message, now, wall)
+        self.vehicle = ReceivedMessage(message, now, wall)
 
     def hear_decision(self, message: Any, now: float, wall: float) -> None:
         """safety/decision."""
         into = self.fired if message.action in FIRES else self.blocks
-        into.setdefault((message.epoch, message.id), Heard(message, now, wall))
+        into.setdefault((message.epoch, message.id), ReceivedMessage(message, now, wall))
         while len(into) > MOST_DECISIONS:
             del into[min(into)]
 
@@ -100,7 +100,7 @@ class Picture:
         self.hear_decision(message, decided, wall)
 
     @property
-    def decisions(self) -> list[Heard]:
+    def decisions(self) -> list[ReceivedMessage]:
         """The newest last."""
         return [one for _, one in sorted({**self.blocks, **self.fired}.items())]
 
@@ -108,7 +108,7 @@ class Picture:
         """safety/action."""
         _remember(self.reports, (message.epoch, message.id, message.link), message, now, wall)
 
-    def state(self, now: float) -> Heard | None:
+    def state(self, now: float) -> ReceivedMessage | None:
         """The state to believe: of those that are not old that of the highest epoch, as one that
         led before may have left its last one behind; else the youngest."""
         fresh = [one for one in self.states.values() if not is_old(self.state_age(one, now))]
@@ -116,7 +116,7 @@ class Picture:
             return max(fresh, key=lambda one: (one.message.epoch, one.received))
         return min(self.states.values(), key=lambda one: self.state_age(one, now), default=None)
 
-    def state_age(self, heard: Heard, now: float) -> float:
+    def state_age(self, heard: ReceivedMessage, now: float) -> float:
         """Since it was sent, s. The first one is latched: where no heartbeat tells its sender's
         clock, its stamp is believed."""
         sent = self._sent(heard.message.supervisor, stamp_seconds(heard.message))
@@ -125,7 +125,7 @@ class Picture:
             sent = heard.received - (latched if heard.number == 1 else 0.0)
         return max(0.0, now - min(sent, heard.received))
 
-    def parachute_age(self, heard: Heard, now: float) -> float:
+    def parachute_age(self, heard: ReceivedMessage, now: float) -> float:
         """Since its device was received by its node, s; NaN: it never was."""
         if stamp_seconds(heard.message) == 0.0:
             return math.nan
@@ -146,9 +146,11 @@ class Picture:
         return stamp + min(ahead) if ahead else math.nan
 
 
-def _remember(into: dict[Any, Heard], key: Any, message: Any, now: float, wall: float) -> None:
+def _remember(
+    into: dict[Any, ReceivedMessage], key: Any, message: Any, now: float, wall: float
+) -> None:
     before = into.pop(key, None)
     number, first = (before.number + 1, before.first) if before else (1, now)
-    into[key] = Heard(message, now, wall, number, first)
+    into[key] = ReceivedMessage(message, now, wall, number, first)
     while len(into) > MOST_NAMES:
         del into[min(into, key=lambda one: into[one].received)]

@@ -18,8 +18,8 @@ from chute_msgs.msg import (
 
 from chute_ros.ros import qos
 from chute_ros.ros.plain_border import with_plain_texts
-from chute_ros.tools.chute.hearing import Picture
-from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.hearing import ReceivedMessages
+from chute_ros.tools.chute.session import ChuteSession
 from chute_ros.tools.chute.view import VehiclePicture, view
 from chute_ros.tools.chute.words import is_old
 
@@ -31,7 +31,10 @@ ROUND = 1.1
 
 
 def subscribe(
-    node: Any, namespace: str, picture: Picture, held: AbstractContextManager[Any] | None = None
+    node: Any,
+    namespace: str,
+    picture: ReceivedMessages,
+    held: AbstractContextManager[Any] | None = None,
 ) -> list[Any]:
     """The subscriptions of node that fill picture with the vehicle in namespace. held: while it
     is filled."""
@@ -54,9 +57,9 @@ class Listening:
     """Listens from now on, with the least load for the vehicle: nothing is sent again for it but
     the latched state, and kills and deploys."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: ChuteSession) -> None:
         self._session = session
-        self.picture = Picture()
+        self.picture = ReceivedMessages()
         subscribe(session.node, session.namespace, self.picture)
 
     def view(self) -> VehiclePicture | None:

@@ -8,13 +8,13 @@ from typing import Any
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
-from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.session import ChuteSession
 
 #: After the first node the others are found within this, s.
 _ALL_WITHIN = 1.0
 
 
-def nodes(session: Session, node: str | None, seconds: float) -> list[str]:
+def nodes(session: ChuteSession, node: str | None, seconds: float) -> list[str]:
     """The nodes of the vehicle, or this one alone if it is there; empty: none within seconds."""
     if node is not None:
         return [node] if session.until(lambda: node in session.links(), seconds) else []
@@ -23,7 +23,9 @@ def nodes(session: Session, node: str | None, seconds: float) -> list[str]:
     return session.links()
 
 
-def parameters_of_node(session: Session, node: str, seconds: float) -> Mapping[str, Any] | None:
+def parameters_of_node(
+    session: ChuteSession, node: str, seconds: float
+) -> Mapping[str, Any] | None:
     """Parameter -> value; None: no answer within seconds."""
     # Not rclpy's client of parameters: it can set them as well, which SROS 2 allows nobody.
     lister = session.node.create_client(ListParameters, f"{node}/list_parameters")

@@ -35,7 +35,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ServiceAnswer:
     """accepted: None where the service has no such field."""
 
     success: bool
@@ -104,7 +104,7 @@ def mode(wanted: Mode, reason: str, force: bool = False) -> Order:
     return Order("mode", "SetMode", f"{SUPERVISOR}/set_mode", fields)
 
 
-def answer_text(order: Order, answer: Answer) -> str:
+def answer_text(order: Order, answer: ServiceAnswer) -> str:
     """In words, with the whole message of who answered."""
     if answer.success:
         outcome = "done"

@@ -7,21 +7,21 @@ import socket
 import sys
 
 from chute_ros.plain_text import plain
-from chute_ros.tools.chute.calling import Call
+from chute_ros.tools.chute.calling import OrderCall
 from chute_ros.tools.chute.confirmation import ask, require_terminal
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.options import ANSWER, Chosen
 from chute_ros.tools.chute.order import (
     SUPERVISOR,
-    Answer,
     Order,
+    ServiceAnswer,
     answer_text,
     not_answered,
     order_of,
 )
 from chute_ros.tools.chute.reach import warning
-from chute_ros.tools.chute.session import Session, opened
+from chute_ros.tools.chute.session import ChuteSession, opened
 from chute_ros.tools.chute.status_text import order_lines
 from chute_ros.tools.streams import NotPrintedError
 
@@ -39,7 +39,7 @@ def main(chosen: Chosen) -> int:
     if asks:
         require_terminal(order.name)
     with opened(chosen.namespace) as session:
-        call = Call(session, order, who)
+        call = OrderCall(session, order, who)
         listening = Listening(session) if asks or order.unreached else None
         within, warned = chosen.wait(), asks
         if not session.until(call.found, within):
@@ -68,7 +68,7 @@ def main(chosen: Chosen) -> int:
     return answer.code
 
 
-def _ask(session: Session, listening: Listening, order: Order) -> None:
+def _ask(session: ChuteSession, listening: Listening, order: Order) -> None:
     """A vehicle that says nothing can be ordered all the same."""
     session.until(listening.view, _SHOWN_WITHIN)
     picture = listening.settle(_SHOWN_WITHIN) if listening.view() else None
@@ -83,7 +83,7 @@ def _warn(order: Order, listening: Listening) -> bool:
     return bool(told)
 
 
-def _told(order: Order, namespace: str, answer: Answer) -> dict[str, object]:
+def _told(order: Order, namespace: str, answer: ServiceAnswer) -> dict[str, object]:
     """For --json."""
     told: dict[str, object] = {"order": order.name, "namespace": namespace}
     told |= {"service": order.service, "sent": True, "answered": True}
@@ -91,7 +91,7 @@ def _told(order: Order, namespace: str, answer: Answer) -> dict[str, object]:
     return told if answer.accepted is None else {**told, "accepted": answer.accepted}
 
 
-def _other_way(session: Session, order: Order) -> str:
+def _other_way(session: ChuteSession, order: Order) -> str:
     """A device node takes the order itself where no supervisor is there; empty: none does."""
     prefix, _, service = order.service.partition("/")
     offered = session.services() if prefix == SUPERVISOR else set()

@@ -6,13 +6,13 @@ import sys
 
 from chute_ros.tools.chute.defaults import defaults_for
 from chute_ros.tools.chute.gathering import expected
-from chute_ros.tools.chute.hearing import Picture
+from chute_ros.tools.chute.hearing import ReceivedMessages
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.node_parameters import nodes, parameters_of_node
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
 from chute_ros.tools.chute.parameter_list import Given, given, parameter_lines
-from chute_ros.tools.chute.session import Session, opened
+from chute_ros.tools.chute.session import ChuteSession, opened
 
 
 def main(chosen: Chosen) -> int:
@@ -48,6 +48,6 @@ def main(chosen: Chosen) -> int:
     return NOT_WELL if silent else DONE
 
 
-def _all_found(session: Session, picture: Picture) -> bool:
+def _all_found(session: ChuteSession, picture: ReceivedMessages) -> bool:
     """Every node that the vehicle should have."""
     return bool(picture.states) and expected(picture) <= {*session.links()}

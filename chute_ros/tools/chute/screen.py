@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.text import Text
 
 from chute_ros.interrupts import CtrlC
-from chute_ros.tools.chute.status_text import Line
+from chute_ros.tools.chute.status_text import StatusLine
 from chute_ros.tools.chute.watch_text import KEYS, Page
 
 #: The tones of timeline_rows.py in colours that the colour-blind can tell (Okabe and Ito).
@@ -132,7 +132,7 @@ def _banner(words: str, width: int, style: str) -> Text:
     return text
 
 
-def _style(line: Line, grey: bool) -> str:
+def _style(line: StatusLine, grey: bool) -> str:
     if grey:
         return _GREY
     if line.tone == "head":

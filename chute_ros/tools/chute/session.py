@@ -28,7 +28,7 @@ _HEARTBEAT = "/safety/heartbeat"
 _MOST_TOLD = 20
 
 
-class Session:
+class ChuteSession:
     """A node in the vehicle's namespace. around: the environment as the user set it."""
 
     def __init__(self, namespace: str, around: Surroundings) -> None:
@@ -112,7 +112,7 @@ def namespaces(node: Any) -> list[str]:
 
 
 @contextmanager
-def opened(namespace: str) -> Iterator[Session]:
+def opened(namespace: str) -> Iterator[ChuteSession]:
     """A session in ROS. CommandError where ROS does not let it start."""
     around = surroundings(os.environ, installed_middlewares())
     set_up_middleware()
@@ -121,7 +121,7 @@ def opened(namespace: str) -> Iterator[Session]:
         # Ctrl-C is Python's: it ends a wait at once, wherever it is.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         with in_one_piece():
-            session = Session(namespace, around)
+            session = ChuteSession(namespace, around)
     except RuntimeError as error:
         text = " ".join(str(error).partition(", at /")[0].split())
         if os.environ.get("ROS_SECURITY_ENABLE") == "true":

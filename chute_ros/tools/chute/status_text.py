@@ -32,7 +32,7 @@ _FIRES = tuple(action.name for action in FIRES)
 
 
 @dataclass(frozen=True)
-class Line:
+class StatusLine:
     """One line. tone: as in timeline_rows.py; "head" for a headline; rows: of a terminal that it
     may take."""
 
@@ -41,15 +41,15 @@ class Line:
     rows: int = 3
 
 
-def headline(picture: VehiclePicture) -> Line:
+def headline(picture: VehiclePicture) -> StatusLine:
     """The state first; what is old is not shown as the state."""
     if is_old(picture.age):
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
-        return Line(text, "quiet")
+        return StatusLine(text, "quiet")
     armed = any(one.armed and not is_old(one.age) for one in picture.parachutes)
     warns = bool(picture.alarms) or picture.mode != Mode.ACTIVE.name
     tone = state_tone(picture.state, picture.unguarded, warns, armed)
-    return Line(state_words(picture.state, picture.unguarded), tone)
+    return StatusLine(state_words(picture.state, picture.unguarded), tone)
 
 
 def state_words(state: str, unguarded: bool) -> str:
@@ -69,7 +69,7 @@ def state_tone(state: str, unguarded: bool, warns: bool, armed: bool) -> str:
     return "warn" if warns and tone in ("good", "plain", "quiet") else tone
 
 
-def status_lines(picture: VehiclePicture) -> list[Line]:
+def status_lines(picture: VehiclePicture) -> list[StatusLine]:
     """Everything but the decisions: for `chute status`, with the state first."""
     fired = newest_fired(picture.decisions)
     return [
@@ -78,10 +78,10 @@ def status_lines(picture: VehiclePicture) -> list[Line]:
         *why_lines(picture),
         *_reasons(picture),
         *_unusable(picture),
-        Line("links", "head"),
+        StatusLine("links", "head"),
         *(_link(one) for one in picture.links),
-        *([] if picture.links else [Line("  none required")]),
-        Line("parachutes", "head"),
+        *([] if picture.links else [StatusLine("  none required")]),
+        StatusLine("parachutes", "head"),
         *(line for one in picture.parachutes for line in _parachute(one)),
         *([] if picture.parachutes else [_no_parachute(picture)]),
         *_vehicle(picture),
@@ -91,7 +91,7 @@ def status_lines(picture: VehiclePicture) -> list[Line]:
     ]
 
 
-def watch_lines(picture: VehiclePicture) -> list[Line]:
+def watch_lines(picture: VehiclePicture) -> list[StatusLine]:
     """The same for a screen of 24 rows, on which what matters most must find its place: each
     thing in as few rows as it needs, what may be long below all others."""
     on_ground = picture.state in ("STARTUP", "BLOCKED")
@@ -100,7 +100,7 @@ def watch_lines(picture: VehiclePicture) -> list[Line]:
     about += f"mode {picture.mode}; flight {flight}"
     reasons = [*_reasons(picture)]
     return [
-        Line(f"  {about}", "plain" if picture.mode == Mode.ACTIVE.name else "bad", rows=2),
+        StatusLine(f"  {about}", "plain" if picture.mode == Mode.ACTIVE.name else "bad", rows=2),
         *why_lines(picture),
         *(reasons if on_ground else []),
         *(_in_short(one) for one in newest_fired(picture.decisions)),
@@ -115,8 +115,8 @@ def watch_lines(picture: VehiclePicture) -> list[Line]:
     ]
 
 
-def _no_parachute(picture: VehiclePicture, what: str = "") -> Line:
-    return Line(f"  {what}{not_here(picture.listened)}", "warn")
+def _no_parachute(picture: VehiclePicture, what: str = "") -> StatusLine:
+    return StatusLine(f"  {what}{not_here(picture.listened)}", "warn")
 
 
 def newest_fired(decisions: Sequence[DecisionView]) -> list[DecisionView]:
@@ -125,14 +125,14 @@ def newest_fired(decisions: Sequence[DecisionView]) -> list[DecisionView]:
     return [one for one in decisions if newest.get(one.action) is one]
 
 
-def decision_lines(decisions: Sequence[DecisionView], title: str) -> list[Line]:
+def decision_lines(decisions: Sequence[DecisionView], title: str) -> list[StatusLine]:
     """The newest first."""
-    lines = [Line(title, "head")]
+    lines = [StatusLine(title, "head")]
     for one in reversed(decisions):
-        lines.append(Line(f"  {one.headline}", _OF_ACTION.get(one.action, "plain")))
-        lines += [Line(f"      {reason}") for reason in one.reasons]
-        lines += [Line(f"      -> {outcome}") for outcome in one.outcomes]
-    return lines if decisions else [*lines, Line("  none")]
+        lines.append(StatusLine(f"  {one.headline}", _OF_ACTION.get(one.action, "plain")))
+        lines += [StatusLine(f"      {reason}") for reason in one.reasons]
+        lines += [StatusLine(f"      -> {outcome}") for outcome in one.outcomes]
+    return lines if decisions else [*lines, StatusLine("  none")]
 
 
 def order_lines(namespace: str, picture: VehiclePicture | None, does: str) -> list[str]:
@@ -147,45 +147,45 @@ def order_lines(namespace: str, picture: VehiclePicture | None, does: str) -> li
     return [*lines, f"this {does}"]
 
 
-def _in_short(one: DecisionView) -> Line:
+def _in_short(one: DecisionView) -> StatusLine:
     told = [*one.reasons, *(f"-> {outcome}" for outcome in one.outcomes)]
     text = f"  {one.headline}: {'; '.join(told)}"
-    return Line(text, _OF_ACTION.get(one.action, "plain"), rows=2)
+    return StatusLine(text, _OF_ACTION.get(one.action, "plain"), rows=2)
 
 
-def _about(picture: VehiclePicture) -> Iterator[Line]:
+def _about(picture: VehiclePicture) -> Iterator[StatusLine]:
     vehicle = f"{picture.namespace}, supervisor {picture.supervisor}, {age_text(picture.age)}"
-    yield Line(_named("vehicle", vehicle), "quiet" if is_old(picture.age) else "plain")
-    yield Line(
+    yield StatusLine(_named("vehicle", vehicle), "quiet" if is_old(picture.age) else "plain")
+    yield StatusLine(
         _named("mode", picture.mode), "plain" if picture.mode == Mode.ACTIVE.name else "bad"
     )
 
 
-def why_lines(picture: VehiclePicture) -> Iterator[Line]:
+def why_lines(picture: VehiclePicture) -> Iterator[StatusLine]:
     """Why it is in this state, and every alarm that this does not tell."""
     listed = picture.flight_blocked and picture.why == "; ".join(picture.block_reasons)
     if picture.why and not listed:
-        yield Line(_named("why", picture.why), headline(picture).tone)
+        yield StatusLine(_named("why", picture.why), headline(picture).tone)
     for alarm in picture.other_alarms:
-        yield Line(_named("ALARM", alarm), "bad")
+        yield StatusLine(_named("ALARM", alarm), "bad")
 
 
-def _reasons(picture: VehiclePicture) -> Iterator[Line]:
+def _reasons(picture: VehiclePicture) -> Iterator[StatusLine]:
     flight = "BLOCKED" if picture.flight_blocked else "not blocked"
-    yield Line(_named("flight", flight), "warn" if picture.flight_blocked else "plain")
+    yield StatusLine(_named("flight", flight), "warn" if picture.flight_blocked else "plain")
     for reason in picture.block_reasons:
-        yield Line(_named("", reason), "warn")
+        yield StatusLine(_named("", reason), "warn")
     for device in picture.device_blocks:
-        yield Line(_named("", f"blocked by device {device}"), "warn")
+        yield StatusLine(_named("", f"blocked by device {device}"), "warn")
 
 
-def _unusable(picture: VehiclePicture) -> Iterator[Line]:
+def _unusable(picture: VehiclePicture) -> Iterator[StatusLine]:
     if picture.state == "IN_FLIGHT":
         # On the ground a measurement that does not move is none, and that is no news.
         for one in picture.unusable:
-            yield Line(_named("cannot be used", one), "warn")
+            yield StatusLine(_named("cannot be used", one), "warn")
         if picture.never_given:
-            yield Line(_named("not measured", ", ".join(picture.never_given)), "plain")
+            yield StatusLine(_named("not measured", ", ".join(picture.never_given)), "plain")
 
 
 def link_text(one: LinkView) -> str:
@@ -203,21 +203,21 @@ def parachute_age_text(one: ParachuteView) -> str:
     return f"{written}{age_text(one.age)}"
 
 
-def _unusable_in_short(picture: VehiclePicture) -> list[Line]:
+def _unusable_in_short(picture: VehiclePicture) -> list[StatusLine]:
     names = [one.partition(":")[0] for one in picture.unusable]
     if picture.state != "IN_FLIGHT" or not names:
         return []
-    return [Line(_named("cannot be used", ", ".join(names)), "warn", rows=1)]
+    return [StatusLine(_named("cannot be used", ", ".join(names)), "warn", rows=1)]
 
 
-def _link(one: LinkView) -> Line:
+def _link(one: LinkView) -> StatusLine:
     tone = LINK_TONE.get(one.state, "warn")
     if one.state == LinkState.OK.name and not one.device_healthy:
         tone = "warn"
-    return Line(_named(one.name, link_text(one)), tone)
+    return StatusLine(_named(one.name, link_text(one)), tone)
 
 
-def _parachute(one: ParachuteView) -> Iterator[Line]:
+def _parachute(one: ParachuteView) -> Iterator[StatusLine]:
     parts = [
         one.state,
         "armed" if one.armed else "disarmed",
@@ -229,18 +229,20 @@ def _parachute(one: ParachuteView) -> Iterator[Line]:
     parts.append(parachute_age_text(one))
     tone = "act" if one.deployed else "live" if one.armed else "plain"
     tone = "quiet" if is_old(one.age) else tone
-    yield Line(_named(f"{one.link} {one.device}", ", ".join(parts)), tone)
+    yield StatusLine(_named(f"{one.link} {one.device}", ", ".join(parts)), tone)
     for fault in one.faults:
-        yield Line(_named("", f"fault: {fault}"), "bad")
+        yield StatusLine(_named("", f"fault: {fault}"), "bad")
 
 
-def _vehicle(picture: VehiclePicture) -> Iterator[Line]:
+def _vehicle(picture: VehiclePicture) -> Iterator[StatusLine]:
     one = picture.vehicle
     if one is None:
-        yield Line("vehicle", "head")
-        yield Line(f"  {not_here(picture.listened)}", "warn")
+        yield StatusLine("vehicle", "head")
+        yield StatusLine(f"  {not_here(picture.listened)}", "warn")
         return
-    yield Line(f"vehicle {one.source or 'of no known source'}, link {one.link_state}", "head")
+    yield StatusLine(
+        f"vehicle {one.source or 'of no known source'}, link {one.link_state}", "head"
+    )
     battery = value_text(one.battery_voltage, "V")
     if one.battery_remaining == one.battery_remaining:
         battery += f", {one.battery_remaining * 100.0:.0f} %"
@@ -253,12 +255,12 @@ def _vehicle(picture: VehiclePicture) -> Iterator[Line]:
     ):
         # A value that was never received is none.
         told = f"{value}, {age_text(age)}" if age == age else age_text(age)
-        yield Line(_named(name, told), "quiet" if is_old(age) else "plain")
+        yield StatusLine(_named(name, told), "quiet" if is_old(age) else "plain")
     for fault in one.faults:
-        yield Line(_named("", f"fault: {fault}"), "bad")
+        yield StatusLine(_named("", f"fault: {fault}"), "bad")
 
 
-def _vehicle_in_short(picture: VehiclePicture) -> list[Line]:
+def _vehicle_in_short(picture: VehiclePicture) -> list[StatusLine]:
     """Two values in a row, grey if either is old."""
     one = picture.vehicle
     title, *lines = _vehicle(picture)
@@ -269,30 +271,30 @@ def _vehicle_in_short(picture: VehiclePicture) -> list[Line]:
     return [title, *map(_side_by_side, pairs), *faults]
 
 
-def _side_by_side(lines: Sequence[Line]) -> Line:
+def _side_by_side(lines: Sequence[StatusLine]) -> StatusLine:
     old = any(line.tone == "quiet" for line in lines)
     text = "".join(f"{line.text:<{_HALF}}" for line in lines)
-    return Line(text.rstrip(), "quiet" if old else "plain")
+    return StatusLine(text.rstrip(), "quiet" if old else "plain")
 
 
-def rule_lines(rules: Sequence[RuleView]) -> Iterator[Line]:
+def rule_lines(rules: Sequence[RuleView]) -> Iterator[StatusLine]:
     """Those that count, with their conditions; the names of the others in one row."""
     active = sum(one.active for one in rules)
     counting = [one for one in rules if one.counts]
     told = f"{len(counting)} counting" if counting else "none counting"
-    yield Line(f"rules: {active} of {len(rules)} active, {told}", "head")
+    yield StatusLine(f"rules: {active} of {len(rules)} active, {told}", "head")
     for one in counting:
         tone = "warn" if one.does == "warns" else _OF_ACTION.get(one.action, "plain")
-        yield Line(f"  {one.name}: {one.does}", tone)
-        yield from (Line(f"      {condition}") for condition in one.conditions)
+        yield StatusLine(f"  {one.name}: {one.does}", tone)
+        yield from (StatusLine(f"      {condition}") for condition in one.conditions)
         if one.denied:
-            yield Line(f"      not acted on: {one.denied}", "warn")
+            yield StatusLine(f"      not acted on: {one.denied}", "warn")
     if waiting := [one.name for one in rules if one.active and not one.counts]:
-        yield Line(f"  not counting: {', '.join(waiting)}", rows=1)
+        yield StatusLine(f"  not counting: {', '.join(waiting)}", rows=1)
 
 
-def _newest(picture: VehiclePicture) -> Line:
-    return Line(f"newest decision: {picture.newest_decision or 'none yet'}", "head")
+def _newest(picture: VehiclePicture) -> StatusLine:
+    return StatusLine(f"newest decision: {picture.newest_decision or 'none yet'}", "head")
 
 
 def _named(name: str, text: str) -> str:

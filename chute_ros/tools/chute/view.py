@@ -22,7 +22,7 @@ from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state_text import MODES, UNGUARDED
-from chute_ros.tools.chute.hearing import Heard, Picture
+from chute_ros.tools.chute.hearing import ReceivedMessage, ReceivedMessages
 from chute_ros.tools.chute.words import NEVER, is_old
 
 #: States in which nothing is wrong, if there is no alarm.
@@ -190,7 +190,7 @@ class VehiclePicture:
         return tuple(one for one in self.alarms if one not in self.why)
 
 
-def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
+def view(picture: ReceivedMessages, namespace: str, now: float) -> VehiclePicture | None:
     """What picture shows at now (monotonic s); None: no supervisor was received."""
     heard = picture.state(now)
     if heard is None:
@@ -245,7 +245,9 @@ def is_unguarded(text: str) -> bool:
     return f"{Stage.IN_FLIGHT.name}, {UNGUARDED}: " in text
 
 
-def _links(picture: Picture, message: Any, age: float, now: float) -> tuple[LinkView, ...]:
+def _links(
+    picture: ReceivedMessages, message: Any, age: float, now: float
+) -> tuple[LinkView, ...]:
     columns = (message.links, message.link_states, message.link_ages, message.devices_healthy)
     found = []
     for name, state, link_age, healthy in zip(*columns, strict=False):
@@ -263,7 +265,7 @@ def _links(picture: Picture, message: Any, age: float, now: float) -> tuple[Link
     return tuple(found)
 
 
-def _device_age(heartbeat: Heard, now: float) -> float:
+def _device_age(heartbeat: ReceivedMessage, now: float) -> float:
     return float(heartbeat.message.age) + (now - heartbeat.received)
 
 
@@ -292,7 +294,7 @@ def _names(mask: int) -> tuple[str, ...]:
     return tuple(names + ([f"bits {other:#x}"] if other else []))
 
 
-def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
+def _vehicle(heard: ReceivedMessage | None, now: float) -> VehicleView | None:
     if heard is None:
         return None
     message = heard.message
@@ -348,7 +350,7 @@ def _newest_decision(message: Any) -> str:
     return f"{action} by rule '{message.decision_rule}' (number {message.decision_id})"
 
 
-def _decision(picture: Picture, heard: Heard, now: float) -> DecisionView:
+def _decision(picture: ReceivedMessages, heard: ReceivedMessage, now: float) -> DecisionView:
     message = heard.message
     reports = [
         one.message

@@ -12,7 +12,7 @@ from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.options import DONE, Chosen
 from chute_ros.tools.chute.screen import full_screen, wants_to_quit
-from chute_ros.tools.chute.session import Session, opened
+from chute_ros.tools.chute.session import ChuteSession, opened
 from chute_ros.tools.chute.view import VehiclePicture
 from chute_ros.tools.chute.watch_text import empty_page, page_of
 from chute_ros.tools.chute.words import is_old
@@ -45,7 +45,7 @@ def main(chosen: Chosen) -> int:
     return DONE
 
 
-def _lines(session: Session, timeout: float | None) -> int:
+def _lines(session: ChuteSession, timeout: float | None) -> int:
     listening = Listening(session)
     printed = 0.0
     before: tuple[object, ...] = ()
@@ -63,7 +63,7 @@ def _lines(session: Session, timeout: float | None) -> int:
 
 
 def _each(
-    session: Session, listening: Listening, timeout: float | None, step: Callable[[], bool]
+    session: ChuteSession, listening: Listening, timeout: float | None, step: Callable[[], bool]
 ) -> None:
     """Have step called each SOONEST until it returns False, while all messages are taken."""
     began = time.monotonic()

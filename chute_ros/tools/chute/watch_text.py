@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chute_ros.plain_text import span_text
-from chute_ros.tools.chute.status_text import Line, headline, watch_lines
+from chute_ros.tools.chute.status_text import StatusLine, headline, watch_lines
 from chute_ros.tools.chute.view import VehiclePicture
 from chute_ros.tools.chute.words import is_old
 
@@ -17,8 +17,8 @@ KEYS = "q ends"
 class Page:
     """banner: the state in large, in its tone; grey: what it shows is old."""
 
-    banner: Line
-    lines: tuple[Line, ...]
+    banner: StatusLine
+    lines: tuple[StatusLine, ...]
     grey: bool = False
 
 
@@ -29,17 +29,17 @@ def page_of(picture: VehiclePicture) -> Page:
         text = f"LAST WORD {span_text(picture.age)} AGO (WAS {spaced(picture.state)})"
     else:
         text = spaced(headline(picture).text)
-    return Page(Line(text, headline(picture).tone), tuple(watch_lines(picture)), grey=old)
+    return Page(StatusLine(text, headline(picture).tone), tuple(watch_lines(picture)), grey=old)
 
 
 def empty_page(namespace: str, around: str, vehicles: Sequence[str], seconds: float) -> Page:
     """Nothing was received yet, for so long (s)."""
     lines = (
-        Line(f"  no supervisor is received in {namespace} for {span_text(seconds)}"),
-        Line(f"  looked for in: {around}"),
-        Line(f"  vehicles found: {', '.join(vehicles) or 'none'}"),
+        StatusLine(f"  no supervisor is received in {namespace} for {span_text(seconds)}"),
+        StatusLine(f"  looked for in: {around}"),
+        StatusLine(f"  vehicles found: {', '.join(vehicles) or 'none'}"),
     )
-    return Page(Line("NOTHING RECEIVED YET", "quiet"), lines, grey=True)
+    return Page(StatusLine("NOTHING RECEIVED YET", "quiet"), lines, grey=True)
 
 
 def spaced(state: str) -> str:

@@ -26,7 +26,7 @@ from typing import Any, TextIO
 
 from chute_ros.conformance.clause import ASKS, READS, SOAK, Clause, Result, Risk, Verdict
 from chute_ros.conformance.kit import Kit
-from chute_ros.conformance.session import Allowed, Bench, Ended, Found, Session, Trying
+from chute_ros.conformance.session import Allowed, Bench, DeviceFound, Ended, Session, Trying
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import at_ctrl_c
 from chute_ros.links.api import LinkKind, load
@@ -35,7 +35,7 @@ from chute_ros.plain_text import plain
 from chute_ros.ros.own_version import own_version
 from chute_ros.sim.command_line import real
 from chute_ros.tools.conformance.page import page
-from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.conformance.report import ConformanceReport
 from chute_ros.tools.conformance.traffic import MCAP, recording
 from chute_ros.tools.page_file import (
     HTML,
@@ -49,7 +49,7 @@ from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
 #: What ends a process besides a Ctrl-C: somebody, or a terminal that is closed.
 _ENDS = {signal.SIGTERM: "SIGTERM", signal.SIGHUP: "the end of its terminal"}
-_UNREAD = "nobody reads what it tells"
+_UNREAD = "nobody reads what it reports"
 DONE, FAILED, MISTAKE, NOT_WHOLE = 0, 1, 2, 3
 #: After a Ctrl-C the device is disarmed, which takes this long at most, s.
 _ENDS_WITHIN = 40.0
@@ -111,7 +111,7 @@ def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.A
         "--soak",
         type=real("seconds", 1.0, 1e6),
         metavar="SECONDS",
-        help="look on for so long in the end",
+        help="watch the device for so long in the end",
     )
     options.add_argument("--html", type=Path, metavar="FILE", help="write the report for people")
     options.add_argument("--junit", type=Path, metavar="FILE", help="write it as JUnit")
@@ -160,7 +160,9 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
             "computer": f"{socket.gethostname()}, Python {platform.python_version()}",
         }
         about, whom = {name: plain(text) for name, text in about.items()}, f"{device} {found}"
-        report = Report(kit.document, whom.strip(), about, results, problem, bench.traffic, began)
+        report = ConformanceReport(
+            kit.document, whom.strip(), about, results, problem, bench.traffic, began
+        )
         _say(report.summary)
         if problem:
             _say(f"conformance: {plain(problem)}", sys.stderr)
@@ -183,7 +185,7 @@ def _require(option: str, package: str) -> None:
         )
 
 
-def _junit(report: Report) -> str:
+def _junit(report: ConformanceReport) -> str:
     # Here: few machines have what only this needs.
     from chute_ros.tools.conformance.junit import junit
 
@@ -226,7 +228,7 @@ def _tried(
             event = _next(events)
             if isinstance(event, Ended):
                 return results, found, event.problem
-            if isinstance(event, Found):
+            if isinstance(event, DeviceFound):
                 found = plain(event.text)
             elif isinstance(event, Result):
                 results.append(event)
@@ -268,7 +270,7 @@ def _next(events: queue.SimpleQueue[Any]) -> Any:
 
 def line_of(event: Any, other: Sequence[str]) -> str:
     """What is told of it; empty: nothing."""
-    if isinstance(event, Found):
+    if isinstance(event, DeviceFound):
         left_out = f"\n  not tried      {len(other)} clauses that are of another kind of device"
         return f"found {plain(event.text)}{left_out if other else ''}"
     if isinstance(event, Trying) and _is_told(event.clause):
@@ -284,7 +286,7 @@ def _is_told(clause: Clause[Any]) -> bool:
     return clause.does not in (READS, ASKS) or SOAK in clause.needs
 
 
-def _write(chosen: argparse.Namespace, report: Report) -> None:
+def _write(chosen: argparse.Namespace, report: ConformanceReport) -> None:
     writers: list[tuple[Path | None, Callable[[Path], object]]] = [
         (chosen.html, lambda path: write_page(path, page(report), HTML)),
         (chosen.junit, lambda path: write_page(path, _junit(report), JUNIT)),

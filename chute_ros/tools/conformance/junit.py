@@ -5,10 +5,10 @@ from __future__ import annotations
 from junitparser import Failure, JUnitXml, Properties, Property, Skipped, TestCase, TestSuite
 
 from chute_ros.conformance.clause import Result, Verdict
-from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.conformance.report import ConformanceReport
 
 
-def junit(report: Report) -> str:
+def junit(report: ConformanceReport) -> str:
     """One test case a clause: a clause that is not supported or not tried is skipped."""
     suite = TestSuite(report.document)
     properties = Properties()  # type: ignore[no-untyped-call]
@@ -26,7 +26,7 @@ def junit(report: Report) -> str:
     return str(xml.tostring().decode())  # type: ignore[no-untyped-call]
 
 
-def _case(report: Report, one: Result) -> TestCase:
+def _case(report: ConformanceReport, one: Result) -> TestCase:
     case = TestCase(one.clause.name, classname=report.document, time=round(one.took, 3))
     if one.verdict is Verdict.FAILED:
         case.result = [Failure(one.why)]

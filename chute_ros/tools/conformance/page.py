@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from chute_ros.conformance.clause import Packet, Result, Verdict
-from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.conformance.report import ConformanceReport
 from chute_ros.tools.report_parts import cell, document, number, section, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -19,12 +19,12 @@ _TONES = {
 #: recording (--mcap).
 _FIRST, _LAST = 20, 20
 _NO_CERTIFICATE = (
-    '<p class="dim">No certificate: it tells what this device did on this bench on this day, and '
+    '<p class="dim">No certificate: it shows what this device did on this bench on this day, and '
     "nothing of a canopy that opens.</p>\n"
 )
 
 
-def page(report: Report) -> str:
+def page(report: ConformanceReport) -> str:
     """The whole page."""
     title = f"Conformance of {report.device}: {report.document}"
     problem = f'<p><b class="bad">{escaped(report.problem)}</b></p>\n' if report.problem else ""

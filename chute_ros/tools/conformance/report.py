@@ -10,7 +10,7 @@ from chute_ros.conformance.clause import Packet, Result, Verdict
 
 
 @dataclass(frozen=True)
-class Report:
+class ConformanceReport:
     """about: what to read of device, kit and machine, each with its name. problem: why it is not
     whole; empty: it is. traffic: all that was sent and received; began: Unix ns of its zero."""
 

@@ -6,14 +6,14 @@ import io
 import json
 import re
 
-from chute_ros.tools.conformance.report import Report
-from chute_ros.tools.page_file import Kind
+from chute_ros.tools.conformance.report import ConformanceReport
+from chute_ros.tools.page_file import FileKind
 
 _NANOSECONDS = 1e9
 #: Who wrote it, as it says itself: black boxes are MCAP as well. Magic, then the header's kind and
 #: length, an empty profile, and the length of this.
 _LIBRARY = "chute_ros conformance"
-MCAP = Kind(
+MCAP = FileKind(
     "MCAP recording of conformance",
     re.compile(rb"\x89MCAP0\r\n\x01.{8}\0{4}.{4}" + _LIBRARY.encode(), re.DOTALL),
 )
@@ -30,7 +30,7 @@ _SCHEMA = {
 }
 
 
-def recording(report: Report) -> bytes:
+def recording(report: ConformanceReport) -> bytes:
     """All traffic, a message a packet, and the report's head as metadata."""
     from mcap.writer import Writer
 

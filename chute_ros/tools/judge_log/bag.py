@@ -59,9 +59,9 @@ def read(path: Path) -> FlightLog:
             f"{path}: a recording of ROS needs the package rosbags: python3 -m pip install rosbags"
         ) from None
     folder = path if path.suffix == ".bag" or path.is_dir() else path.parent
-    teller = _Teller()
+    translator = _BagTranslator()
     if path.suffix == ".mcap":
-        return _of_mcap(path, teller)
+        return _of_mcap(path, translator)
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _end_of(one.topic)]
@@ -70,15 +70,15 @@ def read(path: Path) -> FlightLog:
                 try:
                     message = reader.deserialize(raw, connection.msgtype)
                 except (KeyError, TypesysError):
-                    teller.unknown.add(connection.msgtype)
+                    translator.unknown.add(connection.msgtype)
                     continue
-                teller.take(_end_of(connection.topic), message, time * _NANO)
+                translator.take(_end_of(connection.topic), message, time * _NANO)
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes of its reader
         raise LogError(f"{path}: no recording of ROS that can be read: {reason(error)}") from None
-    return teller.log(path)
+    return translator.log(path)
 
 
-def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
+def _of_mcap(path: Path, translator: _BagTranslator) -> FlightLog:
     """By our own reader, which takes what a power cut has left, as of a black box."""
     entries = McapEntries(path)
     try:
@@ -93,10 +93,10 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
         try:
             message = definitions[schema.id].deserialize_cdr(entry.data, schema.name)
         except Exception:  # noqa: BLE001 - whatever damage makes of its reader
-            teller.unknown.add(schema.name)
+            translator.unknown.add(schema.name)
             continue
-        teller.take(_end_of(entry.channel.topic), message, entry.time * _NANO)
-    log = teller.log(path)
+        translator.take(_end_of(entry.channel.topic), message, entry.time * _NANO)
+    log = translator.log(path)
     log.remarks.extend(entries.remarks)
     return log
 
@@ -128,7 +128,7 @@ def _end_of(topic: str) -> str:
     return next((end for end in ends if topic.endswith(f"/{end}")), "")
 
 
-class _Teller:
+class _BagTranslator:
     """Makes of each message what an autopilot sends."""
 
     def __init__(self) -> None:
@@ -161,7 +161,7 @@ class _Teller:
         """All of it; LogError: nothing of a vehicle."""
         remarks: list[str] = []
         if "armed" not in self._newest:
-            remarks.append("nothing tells when it was armed: taken to be armed throughout")
+            remarks.append("nothing reports when it was armed: taken to be armed throughout")
             beat = told.heartbeat(self._vehicle_type, self._autopilot, True)
             for at in self._out.seconds():
                 self._out.add_change(at, beat)
@@ -170,7 +170,7 @@ class _Teller:
             wants = "vehicle/state, or mavros/global_position/rel_alt, altitude or local_position"
             types = ", ".join(sorted(self.unknown))
             lacking = f"; of these types it has no definition: {types}" if types else ""
-            raise LogError(f"{path}: no topic tells a height (need {wants}){lacking}")
+            raise LogError(f"{path}: no topic reports a height (need {wants}){lacking}")
         if self.unknown:
             remarks.append(f"without a definition: {', '.join(sorted(self.unknown))}")
         return FlightLog(

@@ -19,9 +19,9 @@ from chute_ros.plain_text import plain
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.tools.judge_log import formats, known, table
-from chute_ros.tools.judge_log.findings import Verdict, verdict_of
+from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
-from chute_ros.tools.judge_log.log_flight import Judged, fly
+from chute_ros.tools.judge_log.log_flight import JudgedLog, fly
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
 from chute_ros.tools.page_file import HTML, MARKDOWN, require_output, write_page
@@ -40,7 +40,7 @@ def main() -> None:
     """Exit code 0: nothing would have been released, and no motor stopped in flight; 1: something
     would; 2: a file cannot be read, and nothing of the others would have been."""
     given = _options().parse_args()
-    flights: list[tuple[Verdict, str]] = []
+    flights: list[tuple[LogVerdict, str]] = []
     unread: list[tuple[Path, LogError]] = []
     try:
         columns, read_here = dict(given.column), _read_here(given)
@@ -152,7 +152,7 @@ def config_of(log: FlightLog, profile: str | None) -> SupervisorConfig:
         raise ChuteError(f"--profile {profile or name}: {why}; shipped are {shipped}") from None
 
 
-def flown(log: FlightLog, config: SupervisorConfig) -> Judged:
+def flown(log: FlightLog, config: SupervisorConfig) -> JudgedLog:
     """Fly all of it, and tell how far it is."""
     progress = Progress(f"judging {log.path.name}", max(1, round(log.duration)))
     return fly(log, config, log.duration, lambda at: progress.at(max(0, round(at))))
@@ -165,7 +165,7 @@ def _came(rule: RuleTold) -> str:
     return f"{rule.name} {rule.peak:.2f} of {rule.hold:g} s, {rule.peak_at:.1f} s"
 
 
-def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
+def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
     log = one.log
     lines = [
         f"{log.path}: {log.format}, profile {one.config.profile.name}",

@@ -99,17 +99,17 @@ def _read(path: Path) -> FlightLog:
 
 
 def _told(path: Path, reader: Any, console: str) -> FlightLog:
-    teller = _Teller()
-    teller.said(console)
+    translator = _DataflashTranslator()
+    translator.said(console)
     # It closes nothing itself.
     with reader.filehandle, reader.data_map:
         while (entry := reader.recv_msg()) is not None:
             if entry.get_type() in _READ:
-                teller.take(entry)
-    return teller.log(path)
+                translator.take(entry)
+    return translator.log(path)
 
 
-class _Teller:
+class _DataflashTranslator:
     """Makes of each entry what ArduPilot sends."""
 
     def __init__(self) -> None:
@@ -177,7 +177,7 @@ class _Teller:
             for at, message in self._by_controller or self._by_ahr2:
                 self._out.add(at, message)
         if not self._arming:
-            remarks.append("nothing tells when it was armed: taken to be armed throughout")
+            remarks.append("nothing reports when it was armed: taken to be armed throughout")
         self._heartbeats(vehicle_type)
         self._landed_states()
         return FlightLog(

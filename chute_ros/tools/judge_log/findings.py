@@ -10,7 +10,7 @@ from pathlib import Path
 
 from chute_ros.model import Action
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.judge_log.log_flight import JudgedLog
 from chute_ros.tools.state_rows import RuleTold, rules_of
 
 _DIGITS = str.maketrans("0123456789", "0" * 10)
@@ -44,7 +44,7 @@ class Rating:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LogVerdict:
     """A judged log in a few words, without what was seen of it. first: when it was ended, s of the
     log, NaN: it was not; release_height: where a parachute was released, m, NaN: none was, or
     nobody knew; ratings: of its rules, the nearest first; unknown: the longest first."""
@@ -77,10 +77,10 @@ class Verdict:
         return not math.isnan(self.first)
 
 
-def verdict_of(judged: Judged) -> Verdict:
+def verdict_of(judged: JudgedLog) -> LogVerdict:
     """Of this log."""
     released = [at for at, one in judged.fired if one.action is Action.DEPLOY]
-    return Verdict(
+    return LogVerdict(
         judged.log.path,
         judged.log.format,
         judged.config.profile.name,
@@ -94,7 +94,7 @@ def verdict_of(judged: Judged) -> Verdict:
     )
 
 
-def _words(judged: Judged) -> str:
+def _words(judged: JudgedLog) -> str:
     if judged.fired:
         return ", ".join(
             f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
@@ -102,13 +102,13 @@ def _words(judged: Judged) -> str:
     return "nothing ended the flight" if judged.flew else "never in flight"
 
 
-def height_at(judged: Judged, at: float) -> float:
+def height_at(judged: JudgedLog, at: float) -> float:
     """The height (m) that was known then; NaN: none."""
     known = [state.height for when, state in judged.vehicle if when <= at]
     return known[-1] if known else math.nan
 
 
-def ratings(judged: Judged) -> tuple[Rating, ...]:
+def ratings(judged: JudgedLog) -> tuple[Rating, ...]:
     """Of each rule that may end a flight, the nearest first."""
     told = {one.name: one for one in rules_of(judged.pictures)}
     near = judged.nearest
@@ -120,7 +120,7 @@ def ratings(judged: Judged) -> tuple[Rating, ...]:
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
-def unknown(judged: Judged) -> tuple[Unknown, ...]:
+def unknown(judged: JudgedLog) -> tuple[Unknown, ...]:
     """What of the vehicle could not be used in flight, the longest first."""
     in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
     reasons: dict[str, Counter[str]] = {}
@@ -137,7 +137,7 @@ def unknown(judged: Judged) -> tuple[Unknown, ...]:
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
-def blocked(judged: Judged) -> list[str]:
+def blocked(judged: JudgedLog) -> list[str]:
     """Why the vehicle must not have taken off, as the supervisor knew it when it did; empty: it
     was ready, or nobody knows."""
     before: Sequence[str] = ()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from chute_ros.errors import ChuteError
 from chute_ros.plain_text import plain
-from chute_ros.tools.judge_log.findings import Verdict
+from chute_ros.tools.judge_log.findings import LogVerdict
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.pages import table
 from chute_ros.transport.regular_file import read_regular_text
@@ -67,7 +67,7 @@ def _known(row: dict[str, str]) -> Known:
     return Known(row["file"], row["source"], real, row["what_happened"], row["right"], *times)
 
 
-def mistake(known: Known, verdict: Verdict) -> str:
+def mistake(known: Known, verdict: LogVerdict) -> str:
     """What was decided wrongly, in words; empty: nothing."""
     at = verdict.first
     if known.right == FLIES and verdict.ended:
@@ -82,7 +82,9 @@ def mistake(known: Known, verdict: Verdict) -> str:
 
 
 def page(
-    verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError]], known: dict[str, Known]
+    verdicts: Sequence[LogVerdict],
+    unread: Sequence[tuple[Path, LogError]],
+    known: dict[str, Known],
 ) -> str:
     """The page. ChuteError: of a log nothing is known."""
     missing = [one.path.name for one in verdicts if one.path.name not in known]
@@ -117,7 +119,7 @@ def page(
     return "\n".join(lines) + "\n"
 
 
-def _row(known: Known, one: Verdict) -> Sequence[str]:
+def _row(known: Known, one: LogVerdict) -> Sequence[str]:
     height = one.release_height
     where = "" if math.isnan(height) else f", released at {height:.0f} m"
     simulated = "" if known.real else " (simulated)"

@@ -13,7 +13,7 @@ from builtin_interfaces.msg import Time
 
 from chute_ros.campaign.aircraft import is_for_devices
 from chute_ros.campaign.bus import Bus, Medium, Plug
-from chute_ros.campaign.channel import Nature
+from chute_ros.campaign.channel import Delivery
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.world import World
@@ -40,11 +40,11 @@ _FOLLOWED = 3.0
 #: Pictures of the supervisor are at least so far apart where nothing is decided, s.
 _APART = 0.2
 #: Nothing is lost, damaged or overtaken beyond what the log shows.
-_CABLE = Medium(Nature(0.00025, in_order=True), flip_a_byte)
+_CABLE = Medium(Delivery(0.00025, in_order=True), flip_a_byte)
 
 
 @dataclass
-class Judged:
+class JudgedLog:
     """What became of a log. Times: s from its start; what came in the lead has a negative one."""
 
     log: FlightLog
@@ -85,7 +85,7 @@ class Judged:
 class _Host(SupervisorHost):
     """Keeps pictures of each of its turns that decides something, and of some of the others."""
 
-    judged: Judged
+    judged: JudgedLog
 
     def record(self, turn: FinishedTurn) -> None:
         """One more turn."""
@@ -98,9 +98,9 @@ class _Host(SupervisorHost):
 
 def fly(
     log: FlightLog, config: SupervisorConfig, until: float, progress: Callable[[float], None]
-) -> Judged:
+) -> JudgedLog:
     """Fly the log up to until (s from its start) at most. progress: is told how far it is, s."""
-    judged = Judged(log, config)
+    judged = JudgedLog(log, config)
     world = World()
     ros = Ros(world, 0)
     bus = Bus(world, _CABLE, "log")
@@ -130,7 +130,7 @@ class _Over:
 
     def __init__(
         self,
-        judged: Judged,
+        judged: JudgedLog,
         host: _Host,
         autopilot: RecordedAutopilot,
         progress: Callable[[float], None],
@@ -150,7 +150,7 @@ class _Over:
         return now > first + _FOLLOWED
 
 
-def _hear(judged: Judged, report: i.VehicleReport, difference: float, now: float) -> None:
+def _hear(judged: JudgedLog, report: i.VehicleReport, difference: float, now: float) -> None:
     judged.vehicle.append((now - LEAD, report.state))
 
 

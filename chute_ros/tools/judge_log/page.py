@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.judge_log.findings import Rating, Unknown, Verdict, blocked, height_at
+from chute_ros.tools.judge_log.findings import LogVerdict, Rating, Unknown, blocked, height_at
 from chute_ros.tools.judge_log.flight_log import LogError
-from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.judge_log.log_flight import JudgedLog
 from chute_ros.tools.judge_log.sweep import Tried
 from chute_ros.tools.report_parts import cell, document, listing, number, section, table, words
 from chute_ros.tools.state_rows import state_rows
@@ -32,7 +32,9 @@ _LIMITS = (
 _MOST_POINTS = 4000
 
 
-def page(flights: Sequence[tuple[Verdict, str]], unread: Sequence[tuple[Path, LogError]]) -> str:
+def page(
+    flights: Sequence[tuple[LogVerdict, str]], unread: Sequence[tuple[Path, LogError]]
+) -> str:
     """The whole page. flights: each with its flight_section."""
     title = f"{len(flights)} recorded flights, judged"
     verdicts = [verdict for verdict, _ in flights]
@@ -44,7 +46,7 @@ def page(flights: Sequence[tuple[Verdict, str]], unread: Sequence[tuple[Path, Lo
     return document(title, parts)
 
 
-def _overview(verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError]]) -> str:
+def _overview(verdicts: Sequence[LogVerdict], unread: Sequence[tuple[Path, LogError]]) -> str:
     rows: list[tuple[str, ...]] = []
     for place, one in enumerate(verdicts):
         tone = "act" if one.ended else "good" if one.flew else "quiet"
@@ -66,7 +68,7 @@ def _overview(verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError
     return table(heads, rows)
 
 
-def flight_section(place: int, verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> str:
+def flight_section(place: int, verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> str:
     """What is told of one flight; place: its number on the page, from 0."""
     inner = [
         f'<p>{escaped(one.log.path)}</p><p class="dim">{escaped(_about(one))}</p>',
@@ -88,7 +90,7 @@ def flight_section(place: int, verdict: Verdict, one: Judged, tried: Sequence[Tr
     return f"<section>\n{title}\n{''.join(inner)}\n</section>\n"
 
 
-def _about(one: Judged) -> str:
+def _about(one: JudgedLog) -> str:
     begins = ", begins in flight" if one.begins_in_flight else ""
     judged = "" if one.ended >= one.log.duration - 0.1 else f", judged to {one.ended:.1f} s"
     return (
@@ -97,7 +99,7 @@ def _about(one: Judged) -> str:
     )
 
 
-def _timeline(one: Judged) -> str:
+def _timeline(one: JudgedLog) -> str:
     marks = [
         Mark(at, str(count), f"{d.action.name}: {d.rule}", ACTION_TONES[d.action])
         for count, (at, d) in enumerate(one.decided, 1)
@@ -118,7 +120,7 @@ def _timeline(one: Judged) -> str:
     return draw(rows, windows, f"{one.log.path.name}, as the supervisor saw it")
 
 
-def _decisions(one: Judged) -> str:
+def _decisions(one: JudgedLog) -> str:
     return table(
         ("no.", "time, s", "height, m", "decision", "rule", "reasons"),
         (
@@ -135,7 +137,7 @@ def _decisions(one: Judged) -> str:
     )
 
 
-def _height(one: Judged, at: float) -> str:
+def _height(one: JudgedLog, at: float) -> str:
     height = height_at(one, at)
     return f"{height:.1f}" if math.isfinite(height) else ""
 
@@ -160,7 +162,7 @@ def _ratings(ratings: Sequence[Rating]) -> str:
     )
 
 
-def _unknown(one: Judged, unknown: Sequence[Unknown]) -> str:
+def _unknown(one: JudgedLog, unknown: Sequence[Unknown]) -> str:
     if not any(p.state == Stage.IN_FLIGHT for _, p in one.pictures):
         return '<p class="dim">it was never in flight</p>'
     return table(

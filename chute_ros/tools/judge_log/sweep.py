@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.rules import Rule
-from chute_ros.tools.judge_log.log_flight import Judged, fly
+from chute_ros.tools.judge_log.log_flight import JudgedLog, fly
 from chute_ros.tools.progress import Progress
 
 #: How much further out a threshold is tried, one after the other.
@@ -30,7 +30,7 @@ class Tried:
     clean: float
 
 
-def sweep(judged: Judged) -> list[Tried]:
+def sweep(judged: JudgedLog) -> list[Tried]:
     """Each threshold of the rule that ended this flight; empty: none ended it."""
     if not judged.fired:
         return []

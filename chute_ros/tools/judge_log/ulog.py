@@ -52,7 +52,7 @@ def read(path: Path) -> FlightLog:
         # It prints what it makes of damage.
         with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
             ulog = ULog(str(path), _TOPICS)
-            log = _Teller(ulog).log(path)
+            log = _UlogTranslator(ulog).log(path)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes of its reader
@@ -67,7 +67,7 @@ def read(path: Path) -> FlightLog:
     return log
 
 
-class _Teller:
+class _UlogTranslator:
     """Makes of the topics what PX4 sends."""
 
     def __init__(self, ulog: Any) -> None:

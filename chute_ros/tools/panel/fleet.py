@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from chute_ros.model import name_of
 from chute_ros.supervisor.inputs import Mode
-from chute_ros.tools.chute.hearing import Heard, stamp_seconds
+from chute_ros.tools.chute.hearing import ReceivedMessage, stamp_seconds
 from chute_ros.tools.chute.status_text import state_tone, state_words
 from chute_ros.tools.chute.view import is_unguarded, reason_in
 from chute_ros.tools.chute.words import age_text, is_old
@@ -29,7 +29,7 @@ _UNSURE = _WORST_FIRST.index("DEPLOYED") + 0.5
 _UNGUARDED = _WORST_FIRST.index("FAULT") + 0.5
 
 
-def age_of(heard: Heard | None, now: float) -> float:
+def age_of(heard: ReceivedMessage | None, now: float) -> float:
     """Since a vehicle's supervisor said its summary, s; NaN: it never did. now: monotonic s."""
     if heard is None:
         return math.nan
@@ -38,7 +38,7 @@ def age_of(heard: Heard | None, now: float) -> float:
     return now - heard.received + latched
 
 
-def fleet(those: Iterable[tuple[str, Heard | None]], now: float) -> str:
+def fleet(those: Iterable[tuple[str, ReceivedMessage | None]], now: float) -> str:
     """those: namespace and newest chute_msgs/SafetySummary of each vehicle. now: monotonic s."""
     told = [(name, heard.message if heard else None, age_of(heard, now)) for name, heard in those]
     told.sort(key=lambda one: (_rank(one[1], one[2]), one[0]))

@@ -24,8 +24,8 @@ from chute_ros.ros.parameters import declare, settings_taken
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.settings import settings_from
 from chute_ros.tools.chute.calling import KINDS
-from chute_ros.tools.chute.hearing import Heard
-from chute_ros.tools.chute.order import Answer, Order
+from chute_ros.tools.chute.hearing import ReceivedMessage
+from chute_ros.tools.chute.order import Order, ServiceAnswer
 from chute_ros.tools.chute.session import namespaces
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 from chute_ros.tools.panel.access import Access, Operator
@@ -62,7 +62,7 @@ class PanelNode(Node):
         self._watched: dict[str, tuple[Watched, int]] = {}
         #: Of the fleet's page: how many look at it; subscriptions and newest word of each vehicle.
         self._fleet_viewers = 0
-        self._summaries: dict[str, tuple[Any, Heard | None]] = {}
+        self._summaries: dict[str, tuple[Any, ReceivedMessage | None]] = {}
         #: Full name of a service or topic -> what is used for it.
         self._callers: dict[str, Any] = {}
         #: By namespace.
@@ -121,7 +121,7 @@ class PanelNode(Node):
                 for one in filter(None, held):
                     self._want(partial(self.destroy_subscription, one))
 
-    def fleet(self) -> list[tuple[str, Heard | None]]:
+    def fleet(self) -> list[tuple[str, ReceivedMessage | None]]:
         """Each vehicle with its newest summary. Somebody looks at all."""
         there = self.vehicles()
         with self._lock:
@@ -145,10 +145,12 @@ class PanelNode(Node):
         names = [name for name, _ in self.get_service_names_and_types()]
         return sorted(plain(name.removeprefix(own)) for name in names if name.startswith(own))
 
-    def order(self, namespace: str, order: Order, person: Operator | None) -> Future[Answer]:
+    def order(
+        self, namespace: str, order: Order, person: Operator | None
+    ) -> Future[ServiceAnswer]:
         """Send it, and record who ordered it and what was answered; person: None: it is done to a
         simulated vehicle, and nobody's."""
-        future: Future[Answer] = Future()
+        future: Future[ServiceAnswer] = Future()
         wanted = time.monotonic()
         self._want(lambda: self._call(namespace, order, person, future, wanted))
         return future
@@ -178,7 +180,7 @@ class PanelNode(Node):
                     subscription, before = self._summaries[namespace]
                     number = before.number + 1 if before else 1
                     now, wall = time.monotonic(), time.time()
-                    heard = Heard(with_plain_texts(message), now, wall, number)
+                    heard = ReceivedMessage(with_plain_texts(message), now, wall, number)
                     self._summaries[namespace] = (subscription, heard)
 
         topic = f"{namespace.rstrip('/')}/safety/summary"
@@ -192,7 +194,7 @@ class PanelNode(Node):
         namespace: str,
         order: Order,
         person: Operator | None,
-        answer: Future[Answer],
+        answer: Future[ServiceAnswer],
         wanted: float,
     ) -> None:
         """wanted: when, monotonic s: what waited for too long nobody expects any more."""
@@ -204,16 +206,22 @@ class PanelNode(Node):
         if not answer.set_running_or_notify_cancel():
             return
         if time.monotonic() - wanted > _SENT_WITHIN:
-            answer.set_result(Answer(False, "nothing was sent: the panel was held up", None))
+            answer.set_result(
+                ServiceAnswer(False, "nothing was sent: the panel was held up", None)
+            )
             return
         if not client.service_is_ready():
-            answer.set_result(Answer(False, f"nothing was sent: {service} is not offered", None))
+            answer.set_result(
+                ServiceAnswer(False, f"nothing was sent: {service} is not offered", None)
+            )
             return
         record = self._record(namespace, service, request, person) if person else None
 
         def answered(future: Any) -> None:
             message = with_plain_texts(future.result())
-            one = Answer(message.success, message.message, getattr(message, "accepted", None))
+            one = ServiceAnswer(
+                message.success, message.message, getattr(message, "accepted", None)
+            )
             if record is not None:
                 record(one)
             answer.set_result(one)
@@ -222,7 +230,7 @@ class PanelNode(Node):
 
     def _record(
         self, namespace: str, service: str, request: Any, person: Operator
-    ) -> Callable[[Answer], None]:
+    ) -> Callable[[ServiceAnswer], None]:
         """Put who orders what on safety/person and into the log; what is returned puts the
         answer there."""
         if namespace not in self._records:
@@ -231,7 +239,7 @@ class PanelNode(Node):
         one = self._records[namespace].ordered(service, request, person.text)
         self.get_logger().info(f"{namespace} {service}: {one.told.request}")
 
-        def answered(answer: Answer) -> None:
+        def answered(answer: ServiceAnswer) -> None:
             one.answered(answer)
             self.get_logger().info(f"{namespace} {service}: {answer.message}")
 

@@ -32,7 +32,7 @@ def rocket(telem: Any, age: float, tasks: Iterable[Task]) -> str:
         ("drogue", _switch(telem.ssa_drogue_deployed, "DEPLOYED", "not deployed")),
         ("main parachute", _switch(telem.ssa_main_deployed, "DEPLOYED", "not deployed")),
         ("air brake", _air_brake(telem)),
-        ("satellites", "not told" if telem.num_satellites < 0 else str(telem.num_satellites)),
+        ("satellites", "not reported" if telem.num_satellites < 0 else str(telem.num_satellites)),
         ("BLiMS target", _target(telem)),
         ("telemetry", f"{telem.layout}, {age_text(age)}"),
     ]
@@ -53,7 +53,7 @@ def _key(mode: int) -> str:
     if mode == FlightMode.STARTUP:
         return "not armed"
     known = FlightMode._value2member_map_.keys() - {FlightMode.FAULT}
-    return "ARMED" if mode in known else "not told"
+    return "ARMED" if mode in known else "not reported"
 
 
 def _memory(task: Task) -> str:
@@ -76,13 +76,13 @@ def _memory(task: Task) -> str:
 
 def _switch(value: int, on: str, off: str) -> str:
     if value == _NOT_THERE:
-        return "not told"
+        return "not reported"
     return {0: off, 1: on}.get(value, f"number {value}")
 
 
 def _air_brake(telem: Any) -> str:
     if telem.airbrake_state == _NOT_THERE:
-        return "not told"
+        return "not reported"
     state = _AIR_BRAKE.get(telem.airbrake_state, f"number {telem.airbrake_state}")
     opening = telem.airbrake_deployment
     return state if math.isnan(opening) else f"{state}, {opening * 100.0:.0f} % open"
@@ -90,6 +90,6 @@ def _air_brake(telem: Any) -> str:
 
 def _target(telem: Any) -> str:
     if math.isnan(telem.blims_dist_to_target):
-        return "not told"
+        return "not reported"
     distance = value_text(telem.blims_dist_to_target, "m", 0)
     return f"{distance} at {value_text(telem.blims_bearing_deg, '°', 0)}"

@@ -210,7 +210,7 @@ def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetim
     ]
     if one.height == one.height:
         rows.append(_row("own height", value_text(one.height, "m"), ""))
-    identity = identities.get(f"{one.link} {one.device}", "not told")
+    identity = identities.get(f"{one.link} {one.device}", "not reported")
     rows.append(_row("identity", identity, ""))
     rows += [_row("fault", fault, "bad") for fault in one.faults]
     rows.append(_row("last word", parachute_age_text(one), "quiet" if is_old(one.age) else ""))
@@ -238,7 +238,7 @@ def _released(one: ParachuteView) -> str:
 
 def _packed(date: str, today: datetime.date) -> str:
     if not date:
-        return "not told"
+        return "not reported"
     try:
         days = (today - datetime.date.fromisoformat(date)).days
     except ValueError:

@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from chute_ros.ros import qos
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.diagnostic_tasks import DiagnosticTasks
-from chute_ros.tools.chute.hearing import Picture
+from chute_ros.tools.chute.hearing import ReceivedMessages
 from chute_ros.tools.chute.listening import subscribe
 from chute_ros.tools.chute.reach import out_of_reach
 from chute_ros.tools.chute.view import VehiclePicture, view
@@ -51,7 +51,7 @@ class Watched:
         self.namespace = namespace
         self._node, self._around = node, around
         self._lock = Lock()
-        self._picture = Picture()
+        self._picture = ReceivedMessages()
         self._tasks = DiagnosticTasks(namespace)
         self._telem: tuple[Any, float] | None = None
         self._trace = Trace()

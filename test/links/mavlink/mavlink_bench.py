@@ -2,12 +2,14 @@
 
 import time
 
+from chute_msgs.msg import SafetyState
 from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import SafetyFlags
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
+from chute_ros.ros import qos
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.autopilot_kinds import GENERIC
 
@@ -140,3 +142,21 @@ def do(bench, loop, function):
 
     loop.call(call)
     bench.until(lambda: done, "the simulator has done so")
+
+
+class ChainFlight:
+    """A vehicle from its supervisor to its wires. A subclass makes what is on them."""
+
+    autopilot: Autopilot
+
+    def __init__(self, bench):
+        self.bench = bench
+        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+
+    def act(self, action):
+        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
+
+    def await_stage(self, *stages):
+        self.bench.until(
+            lambda: self.safety and self.safety[-1].state in stages, f"the stage is {stages}"
+        )

@@ -12,7 +12,7 @@ from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Risk, Verdict
-from chute_ros.conformance.session import Allowed, Found, Session
+from chute_ros.conformance.session import Allowed, DeviceFound, Session
 from chute_ros.links.mavlink.conformance import CLAUSES
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench
 from chute_ros.links.mavlink.kit import KIT
@@ -280,7 +280,7 @@ def test_a_device_that_starts_anew_in_the_middle_fails_the_clause_that_was_tried
     device.act("reboot")
     run.to()
     (failed,) = run.of(Verdict.FAILED)
-    assert run.results[failed].why.startswith("it started anew meanwhile (")
+    assert run.results[failed].why.startswith("it restarted meanwhile (")
     assert run.problem == ""
 
 
@@ -292,6 +292,6 @@ def test_where_no_parachute_is_heard_it_tells_who_is() -> None:
     del device.streams[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
     del device.default_intervals[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
     run = Run(device).to()
-    assert run.problem.startswith("no parachute is received within 10 s (heard: 1/42)")
+    assert run.problem.startswith("no parachute is received within 10 s (received from: 1/42)")
     assert run.results == {}
-    assert not any(isinstance(one, Found) for one in run.line.events)
+    assert not any(isinstance(one, DeviceFound) for one in run.line.events)

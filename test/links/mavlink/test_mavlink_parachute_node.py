@@ -9,7 +9,7 @@ from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, VehicleState
 from chute_msgs.srv import Arm, Deploy, SetTriggers
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, do
-from node_bench import LOCAL, port_of
+from node_bench import LOCAL, newest, port_of
 from sensor_msgs.msg import BatteryState
 
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
@@ -21,15 +21,6 @@ from chute_ros.protocol.mavlink.frames import FrameEncoder
 @pytest.fixture
 def network(bench):
     return Network(bench)
-
-
-def newest(messages, **fields):
-    """A condition: the newest message has these fields."""
-    return lambda: (
-        messages
-        and all(getattr(messages[-1], name) == value for name, value in fields.items())
-        and messages[-1]
-    )
 
 
 # parachute/status

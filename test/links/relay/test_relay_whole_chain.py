@@ -3,25 +3,23 @@
 import pytest
 from chute_msgs.msg import SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy
-from mavlink_bench import Autopilot, do
+from mavlink_bench import Autopilot, ChainFlight
 from mavlink_bench import quick as quick_mavlink
 from node_bench import LOCAL, port_of
 from relay_bench import Board
 from std_srvs.srv import Trigger
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.ros import qos
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 HEIGHT = 20.0  # m
 
 
-class Flight:
+class Flight(ChainFlight):
     """A vehicle whose autopilot speaks MAVLink and whose parachute hangs on a relay."""
 
     def __init__(self, bench, **supervisor):
-        self.bench = bench
-        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        super().__init__(bench)
         self.vehicle = bench.follow(VehicleState, "vehicle/state")
         settings = {
             "startup_grace": 0.5,
@@ -42,14 +40,6 @@ class Flight:
             self.autopilot, f"udpin:{LOCAL}:0", f"udpout:{LOCAL}:{port_of(mavlink.loop)}"
         )
         self.board = Board(bench)
-
-    def act(self, action):
-        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
-
-    def await_stage(self, stage):
-        self.bench.until(
-            lambda: self.safety and self.safety[-1].state == stage, f"the stage is {stage}"
-        )
 
     def take_off(self):
         self.board.plug_in()

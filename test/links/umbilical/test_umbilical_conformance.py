@@ -13,7 +13,7 @@ from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import SOAK, Risk, Verdict
-from chute_ros.conformance.session import Allowed, Found, Session
+from chute_ros.conformance.session import Allowed, DeviceFound, Session
 from chute_ros.links.umbilical.conformance import CLAUSES
 from chute_ros.links.umbilical.conformance.bench import UmbilicalBench
 from chute_ros.links.umbilical.conformance.permits import REBOOT, WIPE
@@ -22,7 +22,7 @@ from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.commands import KINDS
 from chute_ros.links.umbilical.simulator.broken import BREAKS
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 
 NAMES = [one.name for one in CLAUSES]
 LAYOUTS = {one.name: one for one in load_layouts("", "the tests")}
@@ -65,7 +65,7 @@ def test_a_sound_device_passes_all_that_can_be_tried() -> None:
     assert run.of(Verdict.NOT_TRIED) == [*unseen, *wants_options]
     assert [*run.results] == NAMES
     assert run.problem == ""
-    assert run.device.mode is Mode.Startup
+    assert run.device.mode is ComputerMode.Startup
 
 
 def test_what_restarts_and_wipes_passes_with_its_options() -> None:
@@ -223,7 +223,7 @@ def test_what_was_not_allowed_is_never_sent(risk: Risk, options: tuple[str, ...]
     wanted |= WIPES if WIPE in options else set()
     wanted -= {"reset_fram"} if risk is Risk.NONE else set()
     assert sent_by(run) == wanted
-    assert run.device.mode is Mode.Startup
+    assert run.device.mode is ComputerMode.Startup
     assert not any(run.device.flight.flags.values())
     tried = [one for one in CLAUSES if run.results[one.name].verdict is not Verdict.NOT_TRIED]
     assert max(one.risk for one in tried) == risk
@@ -271,10 +271,10 @@ def test_two_writes_are_never_closer_than_the_receiver_can_take() -> None:
 @pytest.mark.parametrize(
     ("risk", "reached"),
     [
-        (Risk.ARMS, lambda device: device.mode is Mode.Standby),
+        (Risk.ARMS, lambda device: device.mode is ComputerMode.Standby),
         (Risk.FIRES, lambda device: device.flight.flags["mav_open"]),
         (Risk.FIRES, lambda device: device.flight.flags["sv_open"]),
-        (Risk.FIRES, lambda device: device.mode is Mode.Ascent),
+        (Risk.FIRES, lambda device: device.mode is ComputerMode.Ascent),
     ],
 )
 def test_an_abort_leaves_it_safe(risk: Risk, reached: Callable[[FlightComputer], bool]) -> None:
@@ -284,7 +284,7 @@ def test_an_abort_leaves_it_safe(risk: Risk, reached: Callable[[FlightComputer],
     run.to(lambda: bool(reached(device)))
     run.session.abort("aborted by Ctrl-C", run.line.now)
     run.to()
-    assert device.mode is Mode.Startup
+    assert device.mode is ComputerMode.Startup
     assert not device.flight.flags["mav_open"]
     assert not device.flight.flags["sv_open"]
     assert run.problem == "aborted by Ctrl-C"
@@ -304,7 +304,7 @@ def test_heartbeats_go_on_after_an_abort_in_a_while_without() -> None:
 def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     device = sound()
     run = Run(device, Risk.ARMS, ())
-    run.to(lambda: device.mode is Mode.Standby)
+    run.to(lambda: device.mode is ComputerMode.Standby)
     device.deaf = True
     run.session.abort("aborted by Ctrl-C", run.line.now)
     run.to()
@@ -359,7 +359,7 @@ def test_where_no_telemetry_is_received_nothing_is_tried() -> None:
     run.to()
     assert run.problem.startswith("no $TELEM line is received within 10 s (0 bytes were)")
     assert run.results == {}
-    assert not any(isinstance(one, Found) for one in run.line.events)
+    assert not any(isinstance(one, DeviceFound) for one in run.line.events)
 
 
 def test_a_soak_of_a_device_that_starts_anew_fails() -> None:
@@ -370,5 +370,5 @@ def test_a_soak_of_a_device_that_starts_anew_fails() -> None:
     run.to(lambda: run.line.now > 115.0)
     device.act("reboot")
     run.to()
-    assert run.results["soak"].why == "without a command it started anew"
+    assert run.results["soak"].why == "without a command it restarted"
     assert not math.isnan(device.booted_at)

@@ -10,7 +10,7 @@ from umbilical_bench import RATE, Cable
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.layouts import Record
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 from chute_ros.links.umbilical.telem_message import RENAMED, telem, without_place
 from chute_ros.model import LandedState, LinkState, ParachuteState
 
@@ -115,7 +115,7 @@ def test_each_flight_mode_as_a_parachutes_state(bench):
         ("MainDeployed", ParachuteState.LAUNCHED, True, True),
     ):
         cable.act(f"jump={mode}")
-        cable.await_mode(Mode[mode])
+        cable.await_mode(ComputerMode[mode])
         cable.statuses.clear()
         bench.until(lambda state=state: cable.statuses and cable.statuses[-1].state == state, mode)
         one = cable.statuses[-1]

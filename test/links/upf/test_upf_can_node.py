@@ -6,6 +6,7 @@ import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, TriggerStatus
 from chute_msgs.srv import Deploy, GetNodeInfo
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from node_bench import newest
 from upf_bench import OTHER_LAYOUT, PATIENT, Devices, Network, fly, tasks, values, vehicle_state
 
 from chute_ros.links.upf.protocol import parameters as p
@@ -21,15 +22,6 @@ OK, WARN, ERROR, STALE = (
 )
 READY = ParachuteState.READY
 NAN, INF = math.nan, math.inf
-
-
-def newest(messages, **fields):
-    """A condition: the newest message has these fields."""
-    return lambda: (
-        messages
-        and all(getattr(messages[-1], name) == value for name, value in fields.items())
-        and messages[-1]
-    )
 
 
 # parachute/status, upf/trigger_status

@@ -39,7 +39,7 @@ from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.dronecan.endpoint import Heard
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 from chute_ros.transport.data_types import load_data_types
 
 NAMES = [one.name for one in CLAUSES]
@@ -138,7 +138,7 @@ def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Valu
     run = Run(Risk.NONE)
     right = run.controller.services[bus_requests.GET_SET]
 
-    def answer(request: Heard) -> dict[str, object] | None:
+    def answer(request: ReceivedTransfer) -> dict[str, object] | None:
         name = bytes(request.values["name"]).decode()
         if name not in told:
             return right(request)
@@ -203,7 +203,7 @@ def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None
     run = Run(Risk.NONE)
     right = run.controller.services[bus_requests.GET_SET]
 
-    def answer(request: Heard) -> dict[str, object] | None:
+    def answer(request: ReceivedTransfer) -> dict[str, object] | None:
         wanted = p.value_of(request.values["value"])
         if isinstance(wanted, int) and wanted < 0:
             run.controller.memory.values[p.NODE_STATUS_INTERVAL] = 1
@@ -365,7 +365,7 @@ def test_a_controller_is_not_taken_for_a_trigger() -> None:
     run.bus.nodes.remove(run.trigger)
     run.line.run()
     assert run.problem.startswith("no TriggerStatus is received")
-    assert f"nodes heard: {CONTROLLER_NODE_ID}" in run.problem
+    assert f"received from nodes: {CONTROLLER_NODE_ID}" in run.problem
     assert run.controller.requests_heard == []
 
 
@@ -432,7 +432,7 @@ def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_h
     run = Run(Risk.FIRES, TRIGGER)
     right = run.trigger.services[names.TRIGGER_SERVICE]
 
-    def serve(request: Heard) -> dict[str, object] | None:
+    def serve(request: ReceivedTransfer) -> dict[str, object] | None:
         del run.trigger.broadcasts[names.TRIGGER_STATUS]
         run.trigger.services[names.TRIGGER_SERVICE] = right
         return right(request)

@@ -10,7 +10,7 @@ from upf_bench import Network
 from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.links.upf.protocol.definitions import VEHICLE_SERVICE
 from chute_ros.model import Action, Outcome, ParachuteState
-from chute_ros.protocol.events import Ask, AskSupervisor
+from chute_ros.protocol.events import AskSupervisor, SafetyAsk
 from chute_ros.ros import qos
 from chute_ros.ros.node_executor import NodeExecutor
 
@@ -118,12 +118,12 @@ def test_one_request_that_cannot_be_published_keeps_no_other_back(bench):
     node = asking.network.node
     asks = [
         AskSupervisor(ask, "33", "a test")
-        for ask in (Ask.FLIGHT_BLOCK, Ask.KILL, Ask.FLIGHT_BLOCK_RELEASE)
+        for ask in (SafetyAsk.FLIGHT_BLOCK, SafetyAsk.KILL, SafetyAsk.FLIGHT_BLOCK_RELEASE)
     ]
     published = node.publish
 
     def broken(one):
-        if one.ask is not Ask.KILL:
+        if one.ask is not SafetyAsk.KILL:
             raise RuntimeError("the middleware takes none")
         return published(one)
 

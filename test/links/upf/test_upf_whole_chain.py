@@ -4,26 +4,24 @@ import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray
-from mavlink_bench import Autopilot, do
+from mavlink_bench import Autopilot, ChainFlight, do
 from mavlink_bench import quick as quick_mavlink
 from node_bench import LOCAL, port_of
 from upf_bench import Network
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import LinkState
-from chute_ros.ros import qos
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 LINKS = ["mavlink_parachute", "upf_can"]
 HEIGHT = 20.0  # m
 
 
-class Flight:
+class Flight(ChainFlight):
     """A vehicle whose autopilot speaks MAVLink and whose parachute is a UPF."""
 
     def __init__(self, bench, kill_wait=10.0, **parameters):
-        self.bench = bench
-        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        super().__init__(bench)
         self.vehicle = bench.follow(VehicleState, "vehicle/state")
         self.parachute = bench.follow(ParachuteStatus, "parachute/status")
         bench.add(
@@ -52,14 +50,6 @@ class Flight:
 
     def device(self, action):
         do(self.bench, self.loop, lambda: self.loop.link.act(action))
-
-    def act(self, action):
-        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
-
-    def await_stage(self, *stages):
-        self.bench.until(
-            lambda: self.safety and self.safety[-1].state in stages, f"the stage is {stages}"
-        )
 
     def await_said(self, text):
         self.bench.until(

@@ -32,7 +32,7 @@ from chute_ros.transport.loop import WireLoop
 OTHER_LAYOUT = Path(__file__).parents[2] / "dsdl_other" / "flyfire"
 
 #: Everything by command: nothing happens by itself.
-BY_COMMAND: dict[str, p.Value] = dict.fromkeys(p.EXCLUDES.values(), False)
+BY_COMMAND: dict[str, p.Value] = dict.fromkeys(p.AUTOMATIC, False)
 #: Between two statuses, ms.
 INTERVAL = 50
 #: Limits of a node whose device answers, however busy this machine is.

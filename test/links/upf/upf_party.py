@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
 
 
 class Party:
@@ -11,7 +11,7 @@ class Party:
 
     def __init__(self, definitions, node_id):
         self.endpoint = Endpoint(definitions.types, node_id)
-        self.heard: list[Heard] = []
+        self.heard: list[ReceivedTransfer] = []
         #: Sixteen bytes of each frame that came.
         self.frames: list[bytes] = []
         self.loop: Any = None

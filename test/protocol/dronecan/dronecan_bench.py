@@ -9,7 +9,7 @@ from pathlib import Path
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.bus_node import BusNode, BusNodeConfig
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
 from chute_ros.protocol.events import Notice
 from chute_ros.transport.data_types import load_data_types
 
@@ -66,10 +66,10 @@ class Bench:
         config = {"allocator": False, "time_master": False, **config}
         self.node = BusNode(types(), BusNodeConfig(node_id, "org.test.us", UID, **config))
         self.t = 0.0
-        self.sent: list[tuple[float, Heard]] = []
+        self.sent: list[tuple[float, ReceivedTransfer]] = []
         self.frames: list[bytes] = []
         self.events: list[Notice | KeepTable] = []
-        self.handed_on: list[Heard] = []
+        self.handed_on: list[ReceivedTransfer] = []
         self._listeners: dict[int, Endpoint] = {}
         self._speakers: dict[int, Endpoint] = {}
         self.node.owner_alive(START + 1e6)

@@ -4,7 +4,7 @@ Floats are such as a float16 holds exactly.
 """
 
 from chute_ros.protocol.dronecan.can_frame import CanFrame
-from chute_ros.protocol.dronecan.transfer import Kind, Transfer
+from chute_ros.protocol.dronecan.transfer import Transfer, TransferKind
 
 #: Of the anonymous messages.
 DISCRIMINATOR = 0x1234
@@ -37,7 +37,7 @@ class Vector:
     def transfer(self, type_id):
         payload = bytes.fromhex(self.payload)
         where = (self.source, self.destination, self.transfer_id)
-        return Transfer(Kind(self.mode), type_id, *where, payload, self.priority)
+        return Transfer(TransferKind(self.mode), type_id, *where, payload, self.priority)
 
 
 UNIT = bytes(range(16))

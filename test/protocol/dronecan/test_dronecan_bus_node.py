@@ -26,7 +26,7 @@ from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.bus_node import BusNode, BusNodeConfig
 from chute_ros.protocol.dronecan.calls import Call
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.protocol.events import Severity
 
 
@@ -114,7 +114,7 @@ def test_the_answer_goes_to_who_asked_under_the_same_transfer_id():
     bench = Bench()
     bench.clear().asked(33, GET_SET, 9)
     (answer,) = [heard for _, heard in bench.sent if heard.name == GET_SET]
-    assert (answer.kind, answer.transfer_id, answer.source) == (Kind.RESPONSE, 9, OWN)
+    assert (answer.kind, answer.transfer_id, answer.source) == (TransferKind.RESPONSE, 9, OWN)
     assert [frame[:8] for frame in shown(bench.frames)] == ["100b218a"]
 
 
@@ -136,10 +136,10 @@ def test_what_is_not_standard_is_handed_on():
     bench.speaker(33).respond_to(OWN, "flyfire.ParachuteService", 3, {"result": 1})
     bench.carry(33)
     assert [(one.kind, one.name) for one in bench.handed_on] == [
-        (Kind.REQUEST, "flyfire.VehicleService"),
-        (Kind.MESSAGE, "flyfire.ParachuteStatus"),
-        (Kind.MESSAGE, NODE_STATUS),
-        (Kind.RESPONSE, "flyfire.ParachuteService"),
+        (TransferKind.REQUEST, "flyfire.VehicleService"),
+        (TransferKind.MESSAGE, "flyfire.ParachuteStatus"),
+        (TransferKind.MESSAGE, NODE_STATUS),
+        (TransferKind.RESPONSE, "flyfire.ParachuteService"),
     ]
 
 

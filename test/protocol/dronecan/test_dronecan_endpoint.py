@@ -8,7 +8,7 @@ from dronecan_bench import ALLOCATION, GET_SET, NODE_STATUS, TIME, raw, shown, t
 from chute_ros.errors import MessageError
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import TransferKind
 
 LAUNCH = {"magic_number": 0x5550464C, "node_id": 34}
 
@@ -31,7 +31,11 @@ def test_a_message_is_heard_by_everybody():
     vehicle, trigger = endpoint(), endpoint(34)
     vehicle.broadcast("flyfire.TriggerLaunch", LAUNCH, priority=0)
     (heard,) = carry(vehicle, trigger)
-    assert (heard.kind, heard.name, heard.source) == (Kind.MESSAGE, "flyfire.TriggerLaunch", 10)
+    assert (heard.kind, heard.name, heard.source) == (
+        TransferKind.MESSAGE,
+        "flyfire.TriggerLaunch",
+        10,
+    )
     assert heard.values == LAUNCH
     assert (vehicle.sent_count, trigger.received_count) == (1, 1)
 
@@ -69,10 +73,10 @@ def test_a_request_and_its_response():
     assert shown(frames) == ["100ba18a#0300c5"]
     assert bystander.receive(frames[0], 0.0) is None
     asked = parachute.receive(frames[0], 0.0)
-    assert (asked.kind, asked.source, asked.transfer_id) == (Kind.REQUEST, 10, 5)
+    assert (asked.kind, asked.source, asked.transfer_id) == (TransferKind.REQUEST, 10, 5)
     parachute.respond(asked, {"name": b"Enable APS", "value": {"boolean_value": 1}})
     (answer,) = carry(parachute, vehicle)
-    assert (answer.kind, answer.source, answer.transfer_id) == (Kind.RESPONSE, 33, 5)
+    assert (answer.kind, answer.source, answer.transfer_id) == (TransferKind.RESPONSE, 33, 5)
     assert answer.values["name"] == b"Enable APS"
 
 

@@ -16,8 +16,8 @@ from chute_ros.protocol.dronecan.transfer import (
     MOST_SESSIONS,
     TRANSFER_IDS,
     Assembler,
-    Kind,
     Transfer,
+    TransferKind,
     frames_of,
 )
 
@@ -52,7 +52,9 @@ class Ear:
 def status(source=33, transfer_id=0, payload=bytes(8), priority=16):
     """A ParachuteStatus: two frames, packed."""
     data_type = types().message(STATUS)
-    transfer = Transfer(Kind.MESSAGE, data_type.id, source, 0, transfer_id, payload, priority)
+    transfer = Transfer(
+        TransferKind.MESSAGE, data_type.id, source, 0, transfer_id, payload, priority
+    )
     return transfer, [pack(one) for one in frames_of(transfer, data_type.base_crc)]
 
 
@@ -60,13 +62,13 @@ def information(source=33, transfer_id=0, length=50):
     """A GetNodeInfo response to us: eight frames."""
     data_type = types().response(GET_NODE_INFO)
     payload = bytes(index * 7 & 0xFF for index in range(length))
-    transfer = Transfer(Kind.RESPONSE, data_type.id, source, OWN, transfer_id, payload)
+    transfer = Transfer(TransferKind.RESPONSE, data_type.id, source, OWN, transfer_id, payload)
     return transfer, [pack(one) for one in frames_of(transfer, data_type.base_crc)]
 
 
 def single(source=33, transfer_id=0, payload=bytes(7)):
     """A NodeStatus: one frame."""
-    transfer = Transfer(Kind.MESSAGE, 341, source, 0, transfer_id, payload)
+    transfer = Transfer(TransferKind.MESSAGE, 341, source, 0, transfer_id, payload)
     return transfer, [pack(one) for one in frames_of(transfer, 0)]
 
 
@@ -277,7 +279,7 @@ def test_every_type_fits_into_what_is_put_together():
 
 
 def test_a_transfer_that_cannot_be_is_the_callers_mistake():
-    message, request, response = Kind.MESSAGE, Kind.REQUEST, Kind.RESPONSE
+    message, request, response = TransferKind.MESSAGE, TransferKind.REQUEST, TransferKind.RESPONSE
     for why, *transfer in (
         ("one frame", message, 1, 0, 0, 0, bytes(8)),
         ("0 to 3", message, 341, 0, 0, 0, bytes(7)),
@@ -376,13 +378,13 @@ def test_what_comes_out_of_lost_doubled_and_reordered_frames_was_sent_and_comes_
 
 @given(st.binary(max_size=MOST_PAYLOAD), st.integers(0, 31), st.integers(1, 127), st.data())
 def test_every_transfer_arrives_as_it_was_sent(payload, transfer_id, source, data):
-    kind = data.draw(st.sampled_from(Kind))
+    kind = data.draw(st.sampled_from(TransferKind))
     data_type = {
-        Kind.MESSAGE: types().message(NODE_STATUS),
-        Kind.REQUEST: types().request(GET_NODE_INFO),
-        Kind.RESPONSE: types().response(GET_NODE_INFO),
+        TransferKind.MESSAGE: types().message(NODE_STATUS),
+        TransferKind.REQUEST: types().request(GET_NODE_INFO),
+        TransferKind.RESPONSE: types().response(GET_NODE_INFO),
     }[kind]
-    to = 0 if kind is Kind.MESSAGE else OWN
+    to = 0 if kind is TransferKind.MESSAGE else OWN
     priority = data.draw(st.integers(0, 31))
     transfer = Transfer(kind, data_type.id, source, to, transfer_id, payload, priority)
     frames = frames_of(transfer, data_type.base_crc)
@@ -392,7 +394,7 @@ def test_every_transfer_arrives_as_it_was_sent(payload, transfer_id, source, dat
 
 def test_an_anonymous_message_says_the_low_bits_of_its_type_and_the_discriminator():
     data_type = types().message(ALLOCATION)
-    transfer = Transfer(Kind.MESSAGE, data_type.id, 0, 0, 3, b"\1" + UID[:6], 30)
+    transfer = Transfer(TransferKind.MESSAGE, data_type.id, 0, 0, 3, b"\1" + UID[:6], 30)
     (frame,) = frames_of(transfer, data_type.base_crc, 0xFFFF)
     assert frame == CanFrame(30 << 24 | 0x3FFF << 10 | 1 << 8, b"\1" + UID[:6] + b"\xc3")
     assert Ear().hear([pack(frame)]) == [transfer]

@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+from device_bench import crc
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,16 +17,6 @@ GOLDEN = {
     1: bytes.fromhex("fe090001a100000000002508000303f8c3"),
     2: bytes.fromhex("fd0900000001a100000000000000250800030373a6"),
 }
-
-
-def crc(data):
-    """CRC-16/MCRF4XX, bit by bit, independent of the library."""
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0x8408 if value & 1 else 0)
-    return value
 
 
 def heartbeat(version=2, sequence=0):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, RecordingBench
+from chute_ros.conformance.bench import ReceivedPacket, RecordingBench
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
@@ -36,7 +36,7 @@ EVERY = int(sum(TriggerFlags))
 
 
 @dataclass(frozen=True)
-class Heard(HeardPacket):
+class ReceivedFrame(ReceivedPacket):
     """A frame of the device. refused: why its signature is none of the device's key."""
 
     frame: Frame
@@ -48,7 +48,7 @@ class Heard(HeardPacket):
         return self.frame.message
 
 
-class MavlinkBench(RecordingBench[Heard]):
+class MavlinkBench(RecordingBench[ReceivedFrame]):
     """Commands are sent as component US of the device's own system. risk: the highest that the
     person allows; nothing above it is ever sent. component: of the device, where several are on
     the network; key: signs and verifies, None: nothing is signed; soak: how long it is watched in
@@ -65,7 +65,7 @@ class MavlinkBench(RecordingBench[Heard]):
         self.soak = soak
         self.system = self.component = 0
         self._wanted, self._key = component, key
-        self._every: list[Heard] = []
+        self._every: list[ReceivedFrame] = []
         self._decoders: dict[Hashable, FrameDecoder] = {}
         #: Of each sender, that signs or does not.
         self._encoders: dict[tuple[int, int, bool], FrameEncoder] = {}
@@ -83,7 +83,7 @@ class MavlinkBench(RecordingBench[Heard]):
         for frame in frames:
             raw = bytes(frame.message.get_msgbuf())
             packet = self._noted(frame.message, frame.device, False, raw)
-            one = Heard(now, packet.name, packet, frame, self._refusal(frame, raw))
+            one = ReceivedFrame(now, packet.name, packet, frame, self._refusal(frame, raw))
             self._every.append(one)
             if (frame.system_id, frame.component_id) == (self.system, self.component):
                 self.heard.append(one)
@@ -181,8 +181,8 @@ class MavlinkBench(RecordingBench[Heard]):
         if device is None:
             others = ", ".join(sorted({one.frame.device for one in self._every})) or "nobody"
             raise failed(
-                f"no parachute is received within {_FOUND_WITHIN:g} s (heard: {others}): check "
-                "the connection, and name the device with --component if it calls itself "
+                f"no parachute is received within {_FOUND_WITHIN:g} s (received from: {others}): "
+                "check the connection, and name the device with --component if it calls itself "
                 "something else"
             )
         self.system, self.component = device
@@ -234,8 +234,8 @@ class MavlinkBench(RecordingBench[Heard]):
         return "disarmed"
 
     def status_every(self, interval: int) -> Any:
-        """The answer (Heard) as PARACHUTE_STATUS is to come each so many us (-1: never, 0: as
-        delivered); None: none came."""
+        """The answer (ReceivedFrame) as PARACHUTE_STATUS is to come each so many us (-1: never,
+        0: as delivered); None: none came."""
         answer = yield from self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _STATUS, interval)
         if answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED:
             self._other_interval = interval != 0
@@ -261,7 +261,7 @@ class MavlinkBench(RecordingBench[Heard]):
     def command(
         self, command: int, *params: float, tries: int = TRIES, confirmation: int = 0
     ) -> Any:
-        """The answer to a command (Heard), sent again where none comes; None: none came."""
+        """The ReceivedFrame of its answer, sent again where none comes; None: none came."""
         for number in range(tries):
             self.send(self.command_long(command, *params, confirmation=confirmation + number))
             answer = yield from self.answer(command)
@@ -288,7 +288,7 @@ class MavlinkBench(RecordingBench[Heard]):
         return answer
 
     def status(self) -> Any:
-        """A PARACHUTE_STATUS of now (Heard), asked for, or as it is streamed."""
+        """A PARACHUTE_STATUS of now (ReceivedFrame), asked for, or as it is streamed."""
         self.send(self.command_long(dialect.MAV_CMD_REQUEST_MESSAGE, _STATUS))
         status = yield from self.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
         if status is None:
@@ -311,12 +311,12 @@ def entry_name(enumeration: str, number: int) -> str:
     return known.name if known else f"{enumeration} {number}"
 
 
-def result_of(answer: Heard) -> str:
+def result_of(answer: ReceivedFrame) -> str:
     """The result of an answer by its name."""
     return entry_name("MAV_RESULT", answer.message.result)
 
 
-def refused(answer: Heard | None, what: str, besides: str = "") -> str:
+def refused(answer: ReceivedFrame | None, what: str, besides: str = "") -> str:
     """How what must not be accepted is answered. besides: told of one that is accepted."""
     if answer is None:
         raise failed(f"{what} is not answered")

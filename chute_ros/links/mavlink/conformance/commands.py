@@ -258,7 +258,7 @@ def _soak(bench: MavlinkBench) -> Trial:
     clocks = [one for one in bench.watched if one.kind == "PARACHUTE_STATUS"]
     for earlier, later in pairwise(clocks):
         if later.message.time_boot_ms < earlier.message.time_boot_ms:
-            raise failed("it started anew meanwhile", [earlier.packet, later.packet])
+            raise failed("it restarted meanwhile", [earlier.packet, later.packet])
     return f"{bench.soak:g} s"
 
 

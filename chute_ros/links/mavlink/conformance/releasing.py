@@ -6,8 +6,8 @@ from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_supporte
 from chute_ros.links.mavlink.conformance.bench import (
     ARM,
     EVERY,
-    Heard,
     MavlinkBench,
+    ReceivedFrame,
     refused,
     result_of,
 )
@@ -90,7 +90,7 @@ def _release(bench: MavlinkBench) -> Trial:
     if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
         raise failed(f"a source is armed, GROUND_CLEARED is set: {result_of(answer)}")
 
-    def told() -> Heard | None:
+    def told() -> ReceivedFrame | None:
         statuses = (one for one in bench.heard[since:] if one.kind == "PARACHUTE_STATUS")
         return next((one for one in statuses if one.message.deployment_status), None)
 
@@ -102,7 +102,7 @@ def _release(bench: MavlinkBench) -> Trial:
     trigger = name_of(DeploymentTrigger, number)
     if number not in _US:
         raise failed(f"released by command, and its trigger is {trigger}", [status.packet])
-    return f"{trigger}, told after {status.at - began:.2f} s"
+    return f"{trigger}, reported after {status.at - began:.2f} s"
 
 
 def _stays(bench: MavlinkBench) -> Trial:

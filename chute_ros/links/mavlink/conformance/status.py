@@ -28,7 +28,7 @@ _CLOCK, _CLOCK_LEAST = 0.05, 0.1
 
 
 def _statuses(bench: MavlinkBench) -> Any:
-    """All (Heard) that came so far, or the first that comes."""
+    """All (ReceivedFrame) that came so far, or the first that comes."""
     if not any(one.kind == "PARACHUTE_STATUS" for one in bench.heard):
         yield from bench.wait_for("PARACHUTE_STATUS", STATUS_WITHIN)
     told = bench.look_at(one for one in bench.heard if one.kind == "PARACHUTE_STATUS")
@@ -86,7 +86,7 @@ def _interval_told(bench: MavlinkBench) -> Trial:
         raise failed("accepted, but no MESSAGE_INTERVAL came within 0.4 s")
     message = told[-1].message
     if message.message_id != _STATUS or abs(message.interval_us - _FASTER) > 0.1 * _FASTER:
-        raise failed(f"it tells {message.interval_us} us (need {_FASTER})", [told[-1].packet])
+        raise failed(f"it reports {message.interval_us} us (need {_FASTER})", [told[-1].packet])
     return f"{message.interval_us} us"
 
 
@@ -229,7 +229,7 @@ CLAUSES = (
     ),
     _told(
         "ground-flags",
-        "GROUND_CLEARED (far enough from the ground) and ON_GROUND are not told at once",
+        "GROUND_CLEARED (far enough from the ground) and ON_GROUND are not reported at once",
         _ground,
         READS,
     ),

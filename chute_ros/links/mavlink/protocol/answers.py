@@ -70,4 +70,4 @@ class Answers:
         if self._count < FEWEST or self._asked_at - self._since < self._limit:
             return ""
         silent = f"no answer to any {what} for {now - self._since:.1f} s"
-        return f"does not hear us: {silent}; {_CURE}"
+        return f"receives nothing from us: {silent}; {_CURE}"

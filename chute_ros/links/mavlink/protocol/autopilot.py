@@ -15,8 +15,12 @@ from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
 from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
-from chute_ros.links.mavlink.protocol.stream_watch import Ask, OptionalStreams, StreamWatch
-from chute_ros.links.mavlink.protocol.targets import Vehicle
+from chute_ros.links.mavlink.protocol.stream_watch import (
+    IntervalRequest,
+    OptionalStreams,
+    StreamWatch,
+)
+from chute_ros.links.mavlink.protocol.targets import AutopilotVehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
 from chute_ros.model import (
@@ -172,7 +176,7 @@ class AutopilotTracker:
             self.motor_signs.armed(armed)
             self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
             self._system_status = message.system_status
-            self._readers.targets.vehicle = Vehicle(
+            self._readers.targets.vehicle = AutopilotVehicle(
                 message.autopilot, self.vehicle_type, message.custom_mode
             )
         changes = self.liveness.heard(now)
@@ -189,7 +193,7 @@ class AutopilotTracker:
         self._streams.fill_stores()
         self._begin_streams()
 
-    def messages_due(self, interval: float, now: float) -> tuple[Ask, ...]:
+    def messages_due(self, interval: float, now: float) -> tuple[IntervalRequest, ...]:
         """What to ask for now, so that each needed message comes each interval (s)."""
         needed = self._streams.due(interval, now)
         if needed:

@@ -22,7 +22,7 @@ from typing import Any
 from chute_ros.links.mavlink.protocol import goals
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
-from chute_ros.links.mavlink.protocol.commands import Command, CommandTransactions
+from chute_ros.links.mavlink.protocol.commands import CommandTransactions, MavCommand
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
 from chute_ros.links.mavlink.protocol.firmware import Firmware
@@ -194,12 +194,12 @@ class _HeartbeatWatch:
 
     def due(
         self, autopilot: AutopilotTracker, rate_too: bool, blocked: bool, now: float
-    ) -> list[Command]:
+    ) -> list[MavCommand]:
         """Commands to send once now. rate_too: other intervals may be asked for."""
         this_start = (autopilot.device, autopilot.reboot_count)
         if this_start != self._asked_of:
             self._asked_of, self._times_asked, self._asked = this_start, 0, -math.inf
-        due: list[Command] = []
+        due: list[MavCommand] = []
         if autopilot.liveness.age(now) <= _OLD:
             return due
         obeys = autopilot.settings.firmware is not Firmware.PX4

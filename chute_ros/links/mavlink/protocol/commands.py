@@ -43,7 +43,7 @@ class CommandLimits(Settings):
 
 
 @dataclass(frozen=True)
-class Command:
+class MavCommand:
     """A MAV_CMD for one component; params are param1 to param7."""
 
     system_id: int
@@ -66,7 +66,7 @@ class Acknowledgement:
 class SendCommand:
     """Put this command on the wire now."""
 
-    command: Command
+    command: MavCommand
     confirmation: int
     #: Of the transaction that it belongs to; None: of none (send_once).
     token: int | None = None
@@ -77,7 +77,7 @@ class CommandFinished:
     """A transaction ended: result is a MAV_RESULT or NO_ACKNOWLEDGEMENT."""
 
     token: int
-    command: Command
+    command: MavCommand
     result: int
     sends: int
     seconds: float
@@ -108,7 +108,7 @@ _Key = tuple[int, int, int]
 _NOBODY = 0
 
 
-def _key(command: Command) -> _Key:
+def _key(command: MavCommand) -> _Key:
     return (command.system_id, command.component_id, command.number)
 
 
@@ -117,7 +117,7 @@ class _Transaction:
     """One that waits for its turn since started, or is under way since then."""
 
     tokens: list[int]
-    command: Command
+    command: MavCommand
     family: int
     started: float
     urgent: bool
@@ -152,7 +152,7 @@ class CommandTransactions:
     def start(
         self,
         token: int,
-        command: Command,
+        command: MavCommand,
         now: float,
         urgent: bool = False,
         family: int | None = None,
@@ -181,7 +181,7 @@ class CommandTransactions:
             self._end(key, earlier, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
         self._begin(key, new, now)
 
-    def send_once(self, command: Command, now: float) -> None:
+    def send_once(self, command: MavCommand, now: float) -> None:
         """Send command once; nobody waits for its answer, and it confirms nothing else."""
         key = _key(command)
         self._out.append(SendCommand(command, 0))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
-from chute_ros.links.mavlink.protocol.commands import Command
+from chute_ros.links.mavlink.protocol.commands import MavCommand
 from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
@@ -21,7 +21,7 @@ from chute_ros.model import LinkState, TriggerFlags, flag_names
 from chute_ros.protocol.goal import ConfirmedCommand
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 
-MavlinkGoal = ConfirmedCommand[Command]
+MavlinkGoal = ConfirmedCommand[MavCommand]
 Device = ParachuteTracker | AutopilotTracker
 
 #: Each bit of a trigger mask that a PARACHUTE_STATUS can show.
@@ -36,23 +36,23 @@ FORCED = "forced disarm on the ground"
 _LOOKS = (0.0, 0.025, 0.05, 0.1, 0.2)
 
 
-def command(device: Device, number: int, *params: float) -> Command:
+def command(device: Device, number: int, *params: float) -> MavCommand:
     """A command for device; the params that are not given are 0."""
     p1, p2, p3, p4, p5, p6, p7 = (*map(float, params), *(0.0,) * (7 - len(params)))
-    return Command(device.system_id, device.component_id, number, (p1, p2, p3, p4, p5, p6, p7))
+    return MavCommand(device.system_id, device.component_id, number, (p1, p2, p3, p4, p5, p6, p7))
 
 
-def set_interval(device: Device, message_id: int, interval_us: float) -> Command:
+def set_interval(device: Device, message_id: int, interval_us: float) -> MavCommand:
     """Have a message sent each interval, microseconds."""
     return command(device, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval_us)
 
 
-def request_heartbeat(autopilot: AutopilotTracker) -> Command:
+def request_heartbeat(autopilot: AutopilotTracker) -> MavCommand:
     """Ask for one HEARTBEAT."""
     return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
 
-def request_status(parachute: ParachuteTracker) -> Command:
+def request_status(parachute: ParachuteTracker) -> MavCommand:
     """Ask for one PARACHUTE_STATUS."""
     message_id = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
     return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
@@ -244,7 +244,7 @@ def kill(
     return next_way(())
 
 
-def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> Command:
+def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> MavCommand:
     if method is KillMethod.FLIGHT_TERMINATION:
         return command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
     return command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
@@ -275,7 +275,7 @@ def disarm_on_ground(
 
 
 @dataclass
-class Watch:
+class MessageWatch:
     """Waits for one message of one device; field, if given, must hold value."""
 
     system_id: int
@@ -300,9 +300,11 @@ class Watch:
         return self.message is not None
 
 
-def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[MavlinkGoal, Watch]:
+def request_message(
+    parachute: ParachuteTracker, message_id: int
+) -> tuple[MavlinkGoal, MessageWatch]:
     """Ask for one message (MAV_CMD_REQUEST_MESSAGE)."""
-    watch = Watch(parachute.system_id, parachute.component_id, message_id)
+    watch = MessageWatch(parachute.system_id, parachute.component_id, message_id)
     kind = dialect.mavlink_map.get(message_id)
     name = kind.msgname if kind is not None else f"message {message_id}"
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
@@ -322,10 +324,12 @@ def set_message_interval(
 
 def read_message_interval(
     parachute: ParachuteTracker, message_id: int
-) -> tuple[MavlinkGoal, Watch]:
+) -> tuple[MavlinkGoal, MessageWatch]:
     """Ask how often a message is sent: a MAV_CMD_REQUEST_MESSAGE of MESSAGE_INTERVAL."""
     wanted = dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL
-    watch = Watch(parachute.system_id, parachute.component_id, wanted, "message_id", message_id)
+    watch = MessageWatch(
+        parachute.system_id, parachute.component_id, wanted, "message_id", message_id
+    )
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, message_id)
     name = "MESSAGE_INTERVAL"
     return ConfirmedCommand(f"request of {name}", (ask,), f"{name} came", watch.seen), watch

@@ -16,12 +16,16 @@ from chute_ros.links.mavlink.protocol import goals
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
-from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
+from chute_ros.links.mavlink.protocol.commands import (
+    Acknowledgement,
+    CommandTransactions,
+    MavCommand,
+)
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
+from chute_ros.links.mavlink.protocol.wire import Duplicates, FrameReceiver, Outbox
 from chute_ros.model import Armed, LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -48,7 +52,7 @@ class MavlinkLink:
         self.autopilots = self._devices.autopilots
         commands = CommandTransactions(config.commands, config.effect.effect_timeout)
         self.requests = Requests(commands, config.effect)
-        self._inbox = Inbox(verifier, self.counts)
+        self._inbox = FrameReceiver(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         window = config.commands.late_ack_window
         self._acknowledgements, self._heartbeats = Duplicates(window), Duplicates(window)
@@ -384,7 +388,7 @@ class MavlinkLink:
         for text in self._announcements.take(now):
             self._outbox.send(text, now)
 
-    def _send_command(self, command: Command, confirmation: int, now: float) -> None:
+    def _send_command(self, command: MavCommand, confirmation: int, now: float) -> None:
         message = dialect.MAVLink_command_long_message(
             command.system_id, command.component_id, command.number, confirmation, *command.params
         )

@@ -77,7 +77,7 @@ NEVER_AFTER = 8.0
 
 
 @dataclass(frozen=True)
-class Ask:
+class IntervalRequest:
     """Ask for a message each interval, s; 0: at the rate that the autopilot chooses."""
 
     message_id: int
@@ -131,14 +131,14 @@ class StreamWatch:
         if part in ASKED_FOR:
             self._rates[part].heard(now)
 
-    def due(self, interval: float, now: float) -> tuple[Ask, ...]:
+    def due(self, interval: float, now: float) -> tuple[IntervalRequest, ...]:
         """What to ask for now, so that each message comes each interval (s), or seldomer if that
         is enough."""
         asks = []
         for part, message in ASKED_FOR.items():
             each = max(interval, _SHORTEST.get(part, 0.0))
             if self._lacks(part, each, now) and self._take(part, now):
-                asks.append(Ask(message, each))
+                asks.append(IntervalRequest(message, each))
         return tuple(asks)
 
     def slow(self, now: float) -> dict[str, float]:
@@ -212,7 +212,7 @@ class OptionalStreams:
         rates: Mapping[str, StreamRate],
         interval: float,
         now: float,
-    ) -> tuple[Ask, ...]:
+    ) -> tuple[IntervalRequest, ...]:
         """What to ask for now; interval: of the needed ones, s."""
         if math.isnan(self._begun):
             self._begun = now
@@ -224,10 +224,10 @@ class OptionalStreams:
             elif self._may_ask(message_id, now):
                 self._tries[message_id] += 1
                 self._asked[message_id] = self._asked_at = now
-                return (Ask(message_id, interval * SELDOMER),)
+                return (IntervalRequest(message_id, interval * SELDOMER),)
         return ()
 
-    def give_up(self, wanted: Mapping[int, str], now: float) -> tuple[Ask, ...]:
+    def give_up(self, wanted: Mapping[int, str], now: float) -> tuple[IntervalRequest, ...]:
         """The line is too slow: the next one goes back to the rate that the autopilot chooses."""
         if now - self._gave_up_at < GIVE_UP_EACH:
             return ()
@@ -235,7 +235,7 @@ class OptionalStreams:
             if message_id in self._asked and message_id not in self.given_up:
                 self.given_up.add(message_id)
                 self._gave_up_at = now
-                return (Ask(message_id, 0.0),)
+                return (IntervalRequest(message_id, 0.0),)
         return ()
 
     def _may_ask(self, message_id: int, now: float) -> bool:

@@ -89,7 +89,7 @@ _OF_OTHERS = {
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class AutopilotVehicle:
     """What an autopilot flies, by its newest HEARTBEAT; kind: AutopilotTracker.vehicle_type."""
 
     autopilot: int = dialect.MAV_AUTOPILOT_INVALID
@@ -119,7 +119,7 @@ class Targets:
     """Follows the targets, and sets the vehicle's attitude against its own."""
 
     def __init__(self, readings: Readings) -> None:
-        self.vehicle = Vehicle()
+        self.vehicle = AutopilotVehicle()
         self._readings = readings
         self._axis: Vector | None = None
         self._axis_at = -math.inf

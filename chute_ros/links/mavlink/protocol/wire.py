@@ -15,7 +15,7 @@ from chute_ros.protocol.mavlink.signing import Signer, Verifier
 _MOST_STREAMS = 16
 
 
-class Inbox:
+class FrameReceiver:
     """Bytes from datagrams and streams to frames."""
 
     def __init__(self, verifier: Verifier | None, counts: Counter[str]) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
-from chute_ros.protocol.events import Ask, AskSupervisor, EventLog, ParachuteChanged, ended
+from chute_ros.protocol.events import AskSupervisor, EventLog, ParachuteChanged, SafetyAsk, ended
 from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
@@ -202,7 +202,7 @@ class RelayLink(EventLog):
         self.fired_at = self._now
         self.fires_until = self._now + self.config.pulse_time
         # Nothing ever reports that the parachute is out: a person has to look.
-        self._events.append(AskSupervisor(Ask.FLIGHT_BLOCK, DEVICE, _FIRED))
+        self._events.append(AskSupervisor(SafetyAsk.FLIGHT_BLOCK, DEVICE, _FIRED))
         waiting, self._waiting = self._waiting, {}
         for token in waiting:
             self._end(token, Outcome.SENT, _SENT)

@@ -10,7 +10,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, RecordingBench, first_of
+from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.conformance.permits import check_options, risk_of
@@ -54,7 +54,7 @@ _TOLERANCE = 2e-5
 
 
 @dataclass(frozen=True)
-class HeardLine(HeardPacket):
+class ReceivedLine(ReceivedPacket):
     """A line, or a part of a dump. said: what a line says that is known. For $TELEM: whole: it
     stands alone in its line; texts: its fields; values: those that are of their type, by name;
     problems: why the others are not."""
@@ -68,15 +68,15 @@ class HeardLine(HeardPacket):
 
 
 @dataclass(frozen=True)
-class Watch:
+class ReceivedLines:
     """All that came in a while. began, ended: monotonic s."""
 
-    lines: Sequence[HeardLine]
+    lines: Sequence[ReceivedLine]
     began: float
     ended: float
 
     @property
-    def telemetry(self) -> list[HeardLine]:
+    def telemetry(self) -> list[ReceivedLine]:
         """The $TELEM lines."""
         return [one for one in self.lines if one.kind == TELEM]
 
@@ -87,7 +87,7 @@ class Watch:
         return max(later - earlier for earlier, later in pairwise(times))
 
 
-class UmbilicalBench(RecordingBench[HeardLine]):
+class UmbilicalBench(RecordingBench[ReceivedLine]):
     """layout: of $TELEM. risk, options: what the person allows; nothing beyond is ever sent. soak:
     how long the device is watched in the end, s."""
 
@@ -101,7 +101,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         super().__init__(risk)
         self.layout, self.soak, self.beats = layout, soak, True
         #: What one clause has watched and others look at as well.
-        self.kept: dict[str, Watch] = {}
+        self.kept: dict[str, ReceivedLines] = {}
         #: Bytes that end a line besides its newline.
         self.returns: list[Packet] = []
         self._options = options
@@ -184,7 +184,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
 
     def _keep(self, kind: str, text: str, data: bytes, **more: object) -> None:
         packet = self.noted(False, "device", kind, text, data)
-        self.heard.append(HeardLine(self.now, kind, packet, data, **more))  # type: ignore[arg-type]
+        self.heard.append(ReceivedLine(self.now, kind, packet, data, **more))  # type: ignore[arg-type]
 
     # -- what is sent -----------------------------------------------------------------------------
 
@@ -202,14 +202,14 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         self.noted(True, "us", "write", text_of(data), data)
         self._output.append(data)
 
-    def order(self, name: str, shows: Callable[[HeardLine], bool]) -> Trial:
+    def order(self, name: str, shows: Callable[[ReceivedLine], bool]) -> Trial:
         """Give a command by its name; the text is empty if no telemetry shows its effect."""
         kind = KINDS[name]
         tries = 1 if kind.once else TRIES
         return (yield from self.repeated(kind.command.token, shows, tries))
 
     def repeated(
-        self, data: bytes, shows: Callable[[HeardLine], bool], tries: int = TRIES
+        self, data: bytes, shows: Callable[[ReceivedLine], bool], tries: int = TRIES
     ) -> Trial:
         """The same for bytes that are written so often until the effect shows."""
         began = self.now
@@ -307,7 +307,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         return next((one.values[name] for one in lines), None)
 
     def record(self) -> Any:
-        """The next $TELEM line (HeardLine) that has its fields."""
+        """The next $TELEM line (ReceivedLine) that has its fields."""
         line = yield from self.wait_for(TELEM, PAUSE, lambda one: bool(one.values))
         if line is None:
             raise failed(f"no $TELEM line of {self.layout.count} fields within {PAUSE:g} s")
@@ -318,7 +318,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         line = yield from self.record()
         return tuple(line.values.get(name, math.nan) for name in self.layout.target_fields)
 
-    def aims(self, line: HeardLine, values: tuple[Value, ...]) -> bool:
+    def aims(self, line: ReceivedLine, values: tuple[Value, ...]) -> bool:
         """Whether a $TELEM line shows this target."""
         names = self.layout.target_fields
         return all(
@@ -330,7 +330,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         """Look on for so long, for all clauses that look at what is kept under this name."""
         began = self.now
         yield from self.watch(seconds)
-        self.kept[name] = Watch(self.watched, began, self.now)
+        self.kept[name] = ReceivedLines(self.watched, began, self.now)
         return ""
 
     def nothing(self, *writes: bytes) -> Trial:
@@ -345,7 +345,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         return f"{len(writes)} of them do nothing"
 
     def unchanged(
-        self, before: HeardLine, since: int, when: str, besides: Collection[str] = ()
+        self, before: ReceivedLine, since: int, when: str, besides: Collection[str] = ()
     ) -> None:
         """Nothing that commands move is otherwise from this place of heard on than in a $TELEM
         line, besides these fields; and it did not start anew."""
@@ -356,7 +356,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
                 if None not in (was, now) and str(was) != str(now):
                     raise failed(f"{when} {name} went from {was} to {now}", [one.packet])
             if one.values.get(BOOT, math.inf) < before.values.get(BOOT, -math.inf):
-                raise failed(f"{when} it started anew", [one.packet])
+                raise failed(f"{when} it restarted", [one.packet])
 
     def restart(self) -> Trial:
         """Restart it; the text is empty if it does not begin anew."""
@@ -366,7 +366,7 @@ class UmbilicalBench(RecordingBench[HeardLine]):
         return "" if line is None else f"{self.now - began:.1f} s"
 
     def started_anew(self, boot: Value) -> Any:
-        """The first $TELEM line (HeardLine) whose time since boot, ms, is less than this; None:
+        """The first $TELEM line (ReceivedLine) whose time since boot, ms, is less than this; None:
         none comes."""
         return (
             yield from self.wait_for(
@@ -381,7 +381,7 @@ def text_of(data: bytes) -> str:
     return text if len(text) <= 60 else f"{text[:40]}... ({len(data)} bytes)"
 
 
-def closed(line: HeardLine, valves: Sequence[str] = VALVES) -> bool:
+def closed(line: ReceivedLine, valves: Sequence[str] = VALVES) -> bool:
     """Whether a $TELEM line shows these valves closed."""
     return all(line.values.get(valve) == 0 for valve in valves)
 

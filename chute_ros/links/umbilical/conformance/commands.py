@@ -5,7 +5,7 @@ from __future__ import annotations
 from chute_ros.conformance.clause import Risk, Trial, failed, not_tried
 from chute_ros.links.umbilical.conformance.bench import (
     SETTLES,
-    HeardLine,
+    ReceivedLine,
     UmbilicalBench,
     closed,
     mode_name,
@@ -27,15 +27,15 @@ _NEARLY_FIRES = (
 _VALVES = {"mav": "MAV", "sv": "SV"}
 
 
-def _startup(line: HeardLine) -> bool:
+def _startup(line: ReceivedLine) -> bool:
     return line.values.get("flight_mode") == FlightMode.STARTUP
 
 
-def _standby(line: HeardLine) -> bool:
+def _standby(line: ReceivedLine) -> bool:
     return line.values.get("flight_mode") == FlightMode.STANDBY
 
 
-def _flies(line: HeardLine) -> bool:
+def _flies(line: ReceivedLine) -> bool:
     return line.values.get("flight_mode") in IN_FLIGHT
 
 

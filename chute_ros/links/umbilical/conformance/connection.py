@@ -11,7 +11,7 @@ from chute_ros.links.umbilical.conformance.bench import (
     LOG,
     PAUSE,
     SETTLES,
-    HeardLine,
+    ReceivedLine,
     UmbilicalBench,
 )
 from chute_ros.links.umbilical.conformance.document import (
@@ -83,7 +83,7 @@ def _heartbeat(bench: UmbilicalBench) -> Trial:
 
 
 def _unheard(bench: UmbilicalBench) -> Any:
-    """A while (Watch), after a last heartbeat, in which none is sent."""
+    """A while (ReceivedLines), after a last heartbeat, in which none is sent."""
     if "unheard" not in bench.kept:
         bench.takes(Risk.ARMS, "a while without <H>")
         yield from bench.write(HEARTBEAT.token)
@@ -106,7 +106,9 @@ def _timeout(bench: UmbilicalBench) -> Trial:
     if not lost:
         if any(_connected(one) for one in bench.heard):
             raise failed(f"it counts as connected {_UNHEARD:g} s after the last <H>")
-        raise not_tried("no field of $TELEM and no line of its log tells whether it is connected")
+        raise not_tried(
+            "no field of $TELEM and no line of its log reports whether it is connected"
+        )
     after = lost[0].at - watch.began
     told = f"it counts as lost {after:.1f} s after the last <H>"
     if abs(after - _TIMEOUT) > _TYPICALLY:
@@ -114,7 +116,7 @@ def _timeout(bench: UmbilicalBench) -> Trial:
     return told
 
 
-def _connected(line: HeardLine) -> bool | None:
+def _connected(line: ReceivedLine) -> bool | None:
     """What a line of its log says of the connection; None: nothing."""
     found = _CONNECTION.search(line.data.decode("latin-1")) if line.kind == LOG else None
     return None if found is None else not found[1]

@@ -14,9 +14,9 @@ from chute_ros.links.umbilical.conformance.bench import (
     EFFECT,
     LINE,
     TELEM,
-    HeardLine,
+    ReceivedLine,
+    ReceivedLines,
     UmbilicalBench,
-    Watch,
     mode_name,
 )
 from chute_ros.links.umbilical.conformance.document import (
@@ -43,12 +43,12 @@ _SEQUENCE = re.compile(r"seq=([0-9]{1,9})")
 
 
 def _worked(bench: UmbilicalBench, name: str, silence: float) -> Any:
-    """All that comes (Watch) from a command on, until telemetry goes on or this silence, s; no
-    lines: nothing came of it."""
+    """All that comes (ReceivedLines) from a command on, until telemetry goes on or this silence,
+    s; no lines: nothing came of it."""
     since, began = len(bench.heard), bench.now
     yield from bench.write(KINDS[name].command.token)
 
-    def lines() -> list[HeardLine]:
+    def lines() -> list[ReceivedLine]:
         return [one for one in bench.heard[since:] if one.kind in (LINE, DUMP)]
 
     def over() -> bool:
@@ -60,10 +60,10 @@ def _worked(bench: UmbilicalBench, name: str, silence: float) -> Any:
 
     yield Wait(bench.now + _BEGINS, lines)
     if not lines():
-        return Watch((), began, bench.now)
+        return ReceivedLines((), began, bench.now)
     while not over() and bench.now - bench.heard_at < silence and bench.now - began < _LONGEST:
         yield Wait(min(bench.heard_at + silence, bench.now + _OVER), over)
-    return Watch(bench.heard[since:], began, bench.now)
+    return ReceivedLines(bench.heard[since:], began, bench.now)
 
 
 def _dumped(bench: UmbilicalBench) -> Any:
@@ -73,7 +73,7 @@ def _dumped(bench: UmbilicalBench) -> Any:
     return bench.look_at(bench.kept["dumped"].lines)
 
 
-def _stored(lines: Sequence[HeardLine]) -> int:
+def _stored(lines: Sequence[ReceivedLine]) -> int:
     """Bytes that are neither telemetry nor log."""
     return sum(len(one.data) for one in lines if one.kind in (LINE, DUMP))
 
@@ -126,7 +126,7 @@ def _dump_fram(bench: UmbilicalBench) -> Trial:
 
 
 def _usage(bench: UmbilicalBench) -> Any:
-    """What comes of flash information: the line (HeardLine); None: nothing."""
+    """What comes of flash information: the line (ReceivedLine); None: nothing."""
     yield from bench.write(KINDS["flash_info"].command.token)
     return (yield from bench.wait_for(LINE, EFFECT))
 
@@ -146,7 +146,7 @@ def _flash_info(bench: UmbilicalBench) -> Trial:
 def _restart(bench: UmbilicalBench) -> Trial:
     took = yield from bench.restart()
     if not took:
-        raise failed("<R>: it does not start anew")
+        raise failed("<R>: it does not restart")
     return (yield from _as_started(bench, took))
 
 
@@ -154,8 +154,8 @@ def _as_started(bench: UmbilicalBench, took: str) -> Trial:
     line = yield from bench.record()
     mode = line.values.get("flight_mode")
     if mode != FlightMode.STARTUP:
-        raise failed(f"it starts anew in {mode_name(mode)} (need Startup)", [line.packet])
-    return f"it starts anew after {took}, in Startup"
+        raise failed(f"it restarts in {mode_name(mode)} (need Startup)", [line.packet])
+    return f"it restarts after {took}, in Startup"
 
 
 def _wipe_flash(bench: UmbilicalBench) -> Trial:
@@ -167,13 +167,13 @@ def _wipe_flash(bench: UmbilicalBench) -> Trial:
     line = yield from _usage(bench)
     after = _used(line)
     if math.isnan(before) or math.isnan(after):
-        raise not_tried("it was sent, and <I> does not tell how much of the flash is used")
+        raise not_tried("it was sent, and <I> does not report how much of the flash is used")
     if after >= before > 0.0:
         raise failed(f"after <W> it says {line.packet.text}", [line.packet])
     return str(line.packet.text)
 
 
-def _used(line: HeardLine | None) -> float:
+def _used(line: ReceivedLine | None) -> float:
     """KB of the flash in use by the answer to flash information; NaN: it does not say."""
     return line.said.used if line and isinstance(line.said, FlashUsage) else math.nan
 
@@ -209,7 +209,7 @@ def _wipe_and_reboot(bench: UmbilicalBench) -> Trial:
     began = bench.now
     yield from bench.write(KINDS["wipe_fram_and_reboot"].command.token)
     if (yield from bench.started_anew(line.values.get(BOOT, 0))) is None:
-        raise failed("<X>: it does not start anew")
+        raise failed("<X>: it does not restart")
     told = yield from _as_started(bench, f"{bench.now - began:.1f} s")
     after = yield from _fram(bench)
     if _SEQUENCE.search(before) and not _is_reset(before, after):
@@ -219,7 +219,7 @@ def _wipe_and_reboot(bench: UmbilicalBench) -> Trial:
 
 _stores, _tells = of(STORAGE), of(TELEMETRY)
 CLAUSES: tuple[UmbilicalClause, ...] = (
-    _stores("flash-info", "<I> tells about the flash", _flash_info, ASKS),
+    _stores("flash-info", "<I> reports the flash", _flash_info, ASKS),
     _stores("dump-fram", "<f> dumps the FRAM", _dump_fram, _DUMPS),
     _stores("dump-flash", "<G> dumps the flash", _dump_flash, _DUMPS),
     _tells("dump-interrupts", "a dump of the flash interrupts $TELEM", _interrupts, _DUMPS),

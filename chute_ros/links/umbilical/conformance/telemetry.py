@@ -11,7 +11,7 @@ from chute_ros.conformance.clause import READS, Trial, failed, not_tried
 from chute_ros.links.umbilical.conformance.bench import (
     BOOT,
     PAUSE,
-    HeardLine,
+    ReceivedLine,
     UmbilicalBench,
 )
 from chute_ros.links.umbilical.conformance.document import TELEMETRY, UmbilicalClause, of
@@ -45,7 +45,7 @@ _GRAVITY = (7.0, 13.0)
 
 
 def _listened(bench: UmbilicalBench) -> Any:
-    """A while of listening (Watch), which is the same for all clauses."""
+    """A while of listening (ReceivedLines), which is the same for all clauses."""
     if "listened" not in bench.kept:
         yield from bench.watch_as("listened", _WATCHED)
     bench.look_at(bench.kept["listened"].lines)
@@ -107,14 +107,14 @@ def _fields(bench: UmbilicalBench, names: Sequence[str]) -> Any:
     return lines
 
 
-def _told(bench: UmbilicalBench, line: HeardLine, names: Sequence[str]) -> str:
+def _told(bench: UmbilicalBench, line: ReceivedLine, names: Sequence[str]) -> str:
     """The first of these fields of a line, as they stand there."""
     index = bench.layout.index
     known = [f"{one} {line.texts[index[one]]:.20}" for one in names if one in index]
     return ", ".join(known[:_TOLD]) + (", ..." if len(known) > _TOLD else "")
 
 
-def _at_rest(bench: UmbilicalBench, lines: Sequence[HeardLine]) -> None:
+def _at_rest(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
     for one in lines:
         force = math.hypot(*(one.values[f"accel_{axis}"] for axis in "xyz"))
         if force < _GRAVITY[0] or force > _GRAVITY[1]:
@@ -122,7 +122,7 @@ def _at_rest(bench: UmbilicalBench, lines: Sequence[HeardLine]) -> None:
             raise failed(text, [one.packet])
 
 
-def _of_the_day(bench: UmbilicalBench, lines: Sequence[HeardLine]) -> None:
+def _of_the_day(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
     for earlier, later in pairwise(lines):
         before, after = earlier.values["timestamp"], later.values["timestamp"]
         if after < before < after + _HALF_DAY:  # over midnight it begins again
@@ -130,7 +130,7 @@ def _of_the_day(bench: UmbilicalBench, lines: Sequence[HeardLine]) -> None:
             raise failed(f"timestamp went back from {before:g} to {after:g}", both)
 
 
-def _since_boot(bench: UmbilicalBench, lines: Sequence[HeardLine]) -> None:
+def _since_boot(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
     for earlier, later in pairwise(lines):
         if later.values[BOOT] < earlier.values[BOOT]:
             text = f"{BOOT} went back from {earlier.values[BOOT]} to {later.values[BOOT]}"
@@ -149,7 +149,7 @@ def _field(
     name: str,
     text: str,
     *names: str,
-    look: Callable[[UmbilicalBench, Sequence[HeardLine]], None] = lambda bench, lines: None,
+    look: Callable[[UmbilicalBench, Sequence[ReceivedLine]], None] = lambda bench, lines: None,
 ) -> UmbilicalClause:
     """A clause of these fields. look: what they must be besides their type and range."""
 

@@ -46,7 +46,7 @@ class DumpFinished:
 
 
 @dataclass(frozen=True)
-class Progress:
+class WorkProgress:
     """How far a long work is, in words; total 0: not known."""
 
     text: str
@@ -55,5 +55,11 @@ class Progress:
 
 
 UmbilicalEvent = (
-    events.Event | TelemetryReceived | LogLine | DumpStarted | DumpData | DumpFinished | Progress
+    events.Event
+    | TelemetryReceived
+    | LogLine
+    | DumpStarted
+    | DumpData
+    | DumpFinished
+    | WorkProgress
 )

@@ -46,7 +46,7 @@ _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
 
 
-class FlightComputer:
+class FlightComputerTracker:
     """Follows one flight computer. main_counts: only the main is the parachute, not the drogue."""
 
     def __init__(self, limits: LivenessLimits, main_counts: bool = False) -> None:

@@ -29,7 +29,7 @@ class Situation(enum.Enum):
     UNKNOWN = "not known: no fresh telemetry"
 
 
-class Verdict(enum.Enum):
+class CommandVerdict(enum.Enum):
     """What becomes of a command."""
 
     ALLOWED = "sent"
@@ -38,11 +38,16 @@ class Verdict(enum.Enum):
     NEVER = "never sent"
 
 
-_A, _F, _C, _N = Verdict.ALLOWED, Verdict.FORCE, Verdict.CONFIRM, Verdict.NEVER
+_A, _F, _C, _N = (
+    CommandVerdict.ALLOWED,
+    CommandVerdict.FORCE,
+    CommandVerdict.CONFIRM,
+    CommandVerdict.NEVER,
+)
 
 #: In the order of Situation:
 #: Startup, Standby, Ascent, Coast, Drogue, Main, Fault, lost in flight, unknown.
-_ROWS: dict[str, tuple[Verdict, ...]] = {
+_ROWS: dict[str, tuple[CommandVerdict, ...]] = {
     "heartbeat": (_A, _A, _A, _A, _A, _A, _A, _A, _A),
     "launch": (_N, _C, _N, _N, _N, _N, _N, _N, _N),
     "safe": (_A, _A, _A, _A, _A, _A, _A, _A, _A),
@@ -64,7 +69,7 @@ _ROWS: dict[str, tuple[Verdict, ...]] = {
     "wipe_fram_and_reboot": (_A, _A, _F, _F, _F, _F, _F, _F, _F),
     "set_target": (_A, _A, _A, _A, _A, _A, _A, _A, _A),
 }
-TABLE: dict[tuple[str, Situation], Verdict] = {
+TABLE: dict[tuple[str, Situation], CommandVerdict] = {
     (name, situation): verdict
     for name, row in _ROWS.items()
     for situation, verdict in zip(Situation, row, strict=True)
@@ -93,7 +98,7 @@ _REASONS = {
 class Ruling:
     """Whether a command goes, and why not; empty: it does."""
 
-    verdict: Verdict
+    verdict: CommandVerdict
     refusal: str
 
 
@@ -103,10 +108,10 @@ def rule(name: str, situation: Situation, force: bool) -> Ruling:
         verdict = TABLE[name, situation]
     except KeyError:
         raise TransitionError(f"no rule for {name!r} in {situation}") from None
-    if verdict is Verdict.ALLOWED or (force and verdict is not Verdict.NEVER):
+    if verdict is CommandVerdict.ALLOWED or (force and verdict is not CommandVerdict.NEVER):
         return Ruling(verdict, "")
     mode = f"flight mode {situation.value}"
-    if verdict is Verdict.CONFIRM:
+    if verdict is CommandVerdict.CONFIRM:
         return Ruling(verdict, f"{name} ({mode}) needs an explicit confirmation: set force")
-    fix = "" if verdict is Verdict.NEVER else "; force sends it all the same"
+    fix = "" if verdict is CommandVerdict.NEVER else "; force sends it all the same"
     return Ruling(verdict, f"{name} refused: {_REASONS[name]} ({mode}){fix}; nothing was sent")

@@ -14,11 +14,15 @@ from collections.abc import Hashable
 from chute_ros.links.umbilical.protocol import line_parser as s
 from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
-from chute_ros.links.umbilical.protocol.events import Progress, TelemetryReceived, UmbilicalEvent
-from chute_ros.links.umbilical.protocol.flight_computer import DEVICE, FlightComputer
+from chute_ros.links.umbilical.protocol.events import (
+    TelemetryReceived,
+    UmbilicalEvent,
+    WorkProgress,
+)
+from chute_ros.links.umbilical.protocol.flight_computer import DEVICE, FlightComputerTracker
 from chute_ros.links.umbilical.protocol.heartbeat_hold import HeartbeatHold
 from chute_ros.links.umbilical.protocol.layouts import Layout
-from chute_ros.links.umbilical.protocol.memory import MemoryWorks, Step
+from chute_ros.links.umbilical.protocol.memory import MemoryWorks, WorkStep
 from chute_ros.links.umbilical.protocol.orders import Orders
 from chute_ros.links.umbilical.protocol.scheduler import HEARTBEAT, Command, CommandScheduler
 from chute_ros.links.umbilical.protocol.stream import DumpBytes, Line, StreamReader
@@ -46,7 +50,7 @@ class UmbilicalLink(EventLog):
         self.counts: Counter[str] = Counter()
         self.received_bytes = 0
         self.decoder = TelemetryDecoder(layouts, config.layout, self.counts)
-        self.computer = FlightComputer(
+        self.computer = FlightComputerTracker(
             config.telemetry, main_counts=config.deploy is not DeployStage.DROGUE
         )
         self.memory = MemoryWorks(config.memory)
@@ -185,7 +189,7 @@ class UmbilicalLink(EventLog):
         work = self.memory.work
         if work is None or (work.token == 0 and self.computer.flying):
             return ""
-        if work.step is not Step.BEGUN and self.computer.fresh(self._now):
+        if work.step is not WorkStep.BEGUN and self.computer.fresh(self._now):
             return ""  # it has not begun, and telemetry still comes
         return self.memory.pause
 
@@ -202,7 +206,7 @@ class UmbilicalLink(EventLog):
 
     def _is_one_too_many(self, event: UmbilicalEvent) -> bool:
         """A line for a person, of more than he could read: counted, and left out."""
-        if not isinstance(event, (s.LogLine, Notice, Progress)):
+        if not isinstance(event, (s.LogLine, Notice, WorkProgress)):
             return False
         if isinstance(event, Notice) and event.severity is Severity.ERROR:
             return False

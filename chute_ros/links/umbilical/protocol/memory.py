@@ -36,7 +36,7 @@ _TELL_EACH = 256 * 1024
 _UNASKED_EACH = 5.0
 
 
-class Step(enum.Enum):
+class WorkStep(enum.Enum):
     """How far a work is."""
 
     ASKED = "waiting for its turn on the wire"
@@ -44,19 +44,19 @@ class Step(enum.Enum):
     BEGUN = "in progress"
 
 
-class Sign(enum.Enum):
+class WorkEvent(enum.Enum):
     """What moves it on."""
 
     TOKEN_SENT = "its token was sent"
     FIRST_SIGN = "the flight computer has begun"
 
 
-STEPS: dict[tuple[Step, Sign], Step] = {
-    (Step.ASKED, Sign.TOKEN_SENT): Step.SENT,
-    (Step.ASKED, Sign.FIRST_SIGN): Step.BEGUN,
-    (Step.SENT, Sign.FIRST_SIGN): Step.BEGUN,
-    (Step.BEGUN, Sign.TOKEN_SENT): Step.BEGUN,
-    (Step.BEGUN, Sign.FIRST_SIGN): Step.BEGUN,
+STEPS: dict[tuple[WorkStep, WorkEvent], WorkStep] = {
+    (WorkStep.ASKED, WorkEvent.TOKEN_SENT): WorkStep.SENT,
+    (WorkStep.ASKED, WorkEvent.FIRST_SIGN): WorkStep.BEGUN,
+    (WorkStep.SENT, WorkEvent.FIRST_SIGN): WorkStep.BEGUN,
+    (WorkStep.BEGUN, WorkEvent.TOKEN_SENT): WorkStep.BEGUN,
+    (WorkStep.BEGUN, WorkEvent.FIRST_SIGN): WorkStep.BEGUN,
 }
 
 
@@ -66,7 +66,7 @@ class Work:
 
     name: str
     token: int
-    step: Step
+    step: WorkStep
     last: float
     size: int = 0
     told: int = 0
@@ -99,7 +99,7 @@ class MemoryWorks(EventLog):
         """Ask for a work; the reason why not, or empty."""
         if self.work is not None:
             return f"{name} refused: a {self.work.text} is {self.work.step.value}"
-        self.work = Work(name, token, Step.ASKED, now)
+        self.work = Work(name, token, WorkStep.ASKED, now)
         return ""
 
     def waits_for(self, command: Command) -> bool:
@@ -112,7 +112,7 @@ class MemoryWorks(EventLog):
         work = self.work
         if work is not None and self.waits_for(command):
             self.work = replace(
-                work, step=after(STEPS, work.step, Sign.TOKEN_SENT), last=now, sent=True
+                work, step=after(STEPS, work.step, WorkEvent.TOKEN_SENT), last=now, sent=True
             )
             report = Report(work.token, Outcome.SENT, f"{work.name} sent")
             self._events.append(RequestReport(report))
@@ -123,7 +123,7 @@ class MemoryWorks(EventLog):
     def pause(self) -> str:
         """Why there is no telemetry now, in words; empty: there should be some."""
         work = self.work
-        if work is None or work.step is Step.ASKED:
+        if work is None or work.step is WorkStep.ASKED:
             return ""
         return f"{work.text} {work.step.value}"
 
@@ -148,14 +148,14 @@ class MemoryWorks(EventLog):
         elif isinstance(said, WipeProgress):
             self._sign(self._wipe_name(), now)
             text = f"wiping the flash: {said.done} of {said.total} sectors"
-            self._events.append(events.Progress(text, said.done, said.total))
+            self._events.append(events.WorkProgress(text, said.done, said.total))
         elif isinstance(said, WipeEnded):
             self._wipe_ended(said, now)
 
     def telemetry(self, now: float) -> None:
         """A record came: what pauses the telemetry is over."""
         work = self.work
-        if work is None or work.step is not Step.BEGUN:
+        if work is None or work.step is not WorkStep.BEGUN:
             return
         if work.name == "dump_fram":
             self._end(True, "")
@@ -165,7 +165,7 @@ class MemoryWorks(EventLog):
     def restarted(self) -> None:
         """The flight computer started anew."""
         work = self.work
-        if work is not None and work.step is not Step.ASKED:
+        if work is not None and work.step is not WorkStep.ASKED:
             wanted = work.name == "wipe_fram_and_reboot"
             self._end(wanted, "" if wanted else "the flight computer restarted")
 
@@ -174,15 +174,15 @@ class MemoryWorks(EventLog):
         work = self.work
         if work is None or now < self.next_deadline():
             return False
-        if work.name == "dump_fram" and work.step is Step.BEGUN:
+        if work.name == "dump_fram" and work.step is WorkStep.BEGUN:
             self._end(True, "")
             return False
         waited = self._limit(work)
-        if work.step is Step.BEGUN:
+        if work.step is WorkStep.BEGUN:
             if work.name == "dump_flash":
                 return True
             self._end(False, f"silent for {waited:g} s")
-        elif work.step is Step.SENT:
+        elif work.step is WorkStep.SENT:
             self._end(False, f"no sign of it within {waited:g} s")
         else:
             self._end(False, f"not sent within {waited:g} s: the wire is busy or closed")
@@ -205,7 +205,7 @@ class MemoryWorks(EventLog):
     # -- inside ----------------------------------------------------------------------------------
 
     def _limit(self, work: Work) -> float:
-        if work.step is not Step.BEGUN:
+        if work.step is not WorkStep.BEGUN:
             return self._limits.answer_within
         if work.name == "dump_fram":
             return self._limits.fram_quiet
@@ -222,9 +222,9 @@ class MemoryWorks(EventLog):
             self._end(False, f"the flight computer has begun a {name.replace('_', ' ')} instead")
             work = None
         if work is None:
-            work = Work(name, 0, Step.ASKED, now)
-        begun = work.step is Step.BEGUN
-        self.work = replace(work, step=after(STEPS, work.step, Sign.FIRST_SIGN), last=now)
+            work = Work(name, 0, WorkStep.ASKED, now)
+        begun = work.step is WorkStep.BEGUN
+        self.work = replace(work, step=after(STEPS, work.step, WorkEvent.FIRST_SIGN), last=now)
         if suffix and not begun:
             memory = name.removeprefix("dump_")
             self._events.append(events.DumpStarted(work.token, memory, suffix))
@@ -238,7 +238,7 @@ class MemoryWorks(EventLog):
         self._events.append(events.DumpData(data))
         if size - work.told >= _TELL_EACH:
             self.work = replace(self.work, told=size)
-            self._events.append(events.Progress(f"{work.text}: {size} bytes", size, 0))
+            self._events.append(events.WorkProgress(f"{work.text}: {size} bytes", size, 0))
 
     def _memory_text(self, text: str, now: float) -> None:
         work = self.work
@@ -268,7 +268,7 @@ class MemoryWorks(EventLog):
         size = f", {work.size} bytes" if work.is_dump else ""
         text = f"{work.text} {'complete' if success else 'failed'}{size}"
         text = f"{text}: {why}" if why else text
-        if work.is_dump and work.step is Step.BEGUN:
+        if work.is_dump and work.step is WorkStep.BEGUN:
             self._events.append(events.DumpFinished(work.token, success, text))
         else:
             severity = Severity.INFO if success else Severity.WARNING

@@ -14,7 +14,7 @@ from chute_ros.links.umbilical.protocol.canopies import CANOPIES
 from chute_ros.links.umbilical.protocol.commands import CommandKind, Effect
 from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
-from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
+from chute_ros.links.umbilical.protocol.flight_computer import FlightComputerTracker
 from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.links.umbilical.protocol.line_parser import FlashUsage
 from chute_ros.links.umbilical.protocol.memory import MemoryWorks
@@ -47,7 +47,7 @@ class Orders(EventLog):
         self,
         config: UmbilicalConfig,
         requests: Requests[CommandScheduler],
-        computer: FlightComputer,
+        computer: FlightComputerTracker,
         decoder: TelemetryDecoder,
         memory: MemoryWorks,
     ) -> None:

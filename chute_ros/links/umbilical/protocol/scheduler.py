@@ -73,7 +73,7 @@ class SchedulerLimits(Settings):
 
 
 @dataclass(frozen=True)
-class Send:
+class SendToken:
     """Write this command's token. token: number of the request's command; None: of none."""
 
     command: Command
@@ -109,12 +109,12 @@ class CommandScheduler:
         self.is_open = False
         #: No heartbeat is sent for now, whoever is alive.
         self.heartbeats_held = False
-        self._urgent: deque[Send] = deque()
-        self._others: deque[Send] = deque()
+        self._urgent: deque[SendToken] = deque()
+        self._others: deque[SendToken] = deque()
         self._heartbeats_until = -math.inf
         self._free_at = -math.inf
         self._heartbeat_at = -math.inf
-        self._output: list[Send] = []
+        self._output: list[SendToken] = []
         self._finished: list[NotSent] = []
 
     @property
@@ -144,11 +144,11 @@ class CommandScheduler:
             self._finished.append(NotSent(token, command, self.limits.most_waiting))
             return
         queue = self._urgent if urgent else self._others
-        queue.append(Send(command, token))
+        queue.append(SendToken(command, token))
 
     def send_once(self, command: Command, now: float) -> None:
         """Queue a command that belongs to no request's loop."""
-        self._others.append(Send(command))
+        self._others.append(SendToken(command))
 
     def cancel(self, token: int, now: float) -> None:
         """It is not needed any more: it does not leave if it has not yet."""
@@ -197,7 +197,7 @@ class CommandScheduler:
         finished, self._finished = self._finished, []
         return finished
 
-    def take_output(self) -> list[Send]:
+    def take_output(self) -> list[SendToken]:
         """What is to be written; each is handed out once."""
         output, self._output = self._output, []
         return output
@@ -208,12 +208,12 @@ class CommandScheduler:
         self.heartbeats_sent += 1
         self.last_heartbeat = now
         self._heartbeat_at = now + self.limits.heartbeat_interval
-        self._emit(Send(HEARTBEAT), now)
+        self._emit(SendToken(HEARTBEAT), now)
 
-    def _send(self, waiting: Send, now: float) -> None:
+    def _send(self, waiting: SendToken, now: float) -> None:
         self.commands_sent += 1
         self._emit(waiting, now)
 
-    def _emit(self, send: Send, now: float) -> None:
+    def _emit(self, send: SendToken, now: float) -> None:
         self._free_at = now + self.limits.spacing
         self._output.append(send)

@@ -10,7 +10,7 @@ from chute_ros.links.umbilical.protocol.commands import KINDS
 from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.commands import HEARTBEAT
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 
 #: Confused by some bytes, it takes no command for so long, s.
 _DEAF = 4.7
@@ -71,8 +71,12 @@ class BrokenFlightComputer(FlightComputer):
             self.flight.flags["mav_open"] = mav
         elif self._breaks == "target" and self.flight.target is not target:
             self.flight.target = self.flight.target[::-1]
-        elif self._breaks == "launch-disarmed" and token == "<L>" and self.mode is Mode.Startup:
-            self.flight.jump(Mode.Ascent)
+        elif (
+            self._breaks == "launch-disarmed"
+            and token == "<L>"
+            and self.mode is ComputerMode.Startup
+        ):
+            self.flight.jump(ComputerMode.Ascent)
 
     def aim(self, *target: float) -> None:
         """It has this target, whatever it was told."""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 
 from chute_ros.links.umbilical.simulator.commands import target_of
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 from chute_ros.sim.acting import NotNowError
 from chute_ros.sim.rocket import Rocket
 
@@ -59,7 +59,7 @@ class FlightProgram:
 
     def restart(self) -> None:
         """Begin as after a reset. A canopy that is out stays out."""
-        self.mode = Mode.Startup
+        self.mode = ComputerMode.Startup
         #: The flash was wiped; needed for arming with the interlock.
         self.may_arm = False
         self.target: tuple[float, ...] = ()
@@ -82,12 +82,12 @@ class FlightProgram:
 
     def turn_key(self) -> None:
         """Follow the arming key, once each turn of the flight loop."""
-        if self.mode is Mode.Startup and self._key:
+        if self.mode is ComputerMode.Startup and self._key:
             self.armed_altitude = self.rocket.altitude
-            self._enter(Mode.Standby)
-        elif self.mode is Mode.Standby and not self._key:
+            self._enter(ComputerMode.Standby)
+        elif self.mode is ComputerMode.Standby and not self._key:
             self.may_arm = False
-            self._enter(Mode.Startup)
+            self._enter(ComputerMode.Startup)
 
     def fly(self, dt: float, is_running: bool) -> None:
         """Move the world on by dt, simulated s, and watch it if the program runs."""
@@ -100,11 +100,11 @@ class FlightProgram:
 
     def fail(self) -> None:
         """Go to Fault: nothing is automatic any more."""
-        self._enter(Mode.Fault)
+        self._enter(ComputerMode.Fault)
 
     def arm_and_launch(self) -> None:
         """What a crew does: turn the key, and launch. NotNowError: it cannot."""
-        if self.mode not in (Mode.Startup, Mode.Standby):
+        if self.mode not in (ComputerMode.Startup, ComputerMode.Standby):
             raise NotNowError(f"it is in {self.mode.name}: need Startup or Standby")
         if not self.rocket.on_ground or not math.isnan(self.rocket.burned_for):
             raise NotNowError("its motor is spent: start over (mend)")
@@ -120,27 +120,27 @@ class FlightProgram:
         self._drogue_out_for = math.inf
         self.is_stuck, self.drogue_fails = False, self._settings.drogue_fails
 
-    def jump(self, mode: Mode) -> None:
+    def jump(self, mode: ComputerMode) -> None:
         """Put the rocket where it plausibly is in this mode."""
-        if mode is Mode.Fault:
+        if mode is ComputerMode.Fault:
             self.fail()
             return
         places = {
-            Mode.Ascent: (300.0, 155.0, 3.8),
-            Mode.Coast: (2000.0, 50.0, math.inf),
-            Mode.DrogueDeployed: (2500.0, -28.0, math.inf),
-            Mode.MainDeployed: (400.0, -6.6, math.inf),
+            ComputerMode.Ascent: (300.0, 155.0, 3.8),
+            ComputerMode.Coast: (2000.0, 50.0, math.inf),
+            ComputerMode.DrogueDeployed: (2500.0, -28.0, math.inf),
+            ComputerMode.MainDeployed: (400.0, -6.6, math.inf),
         }
         height, speed, burned = places.get(mode, (0.0, 0.0, math.nan))
         self.rocket = Rocket(height=height, vertical_speed=speed, burned_for=burned, apogee=height)
-        self._key = mode is not Mode.Startup
-        self._set("mav_open", int(mode is Mode.Ascent))
-        drogue = mode in (Mode.DrogueDeployed, Mode.MainDeployed)
+        self._key = mode is not ComputerMode.Startup
+        self._set("mav_open", int(mode is ComputerMode.Ascent))
+        drogue = mode in (ComputerMode.DrogueDeployed, ComputerMode.MainDeployed)
         self._set("ssa_drogue_deployed", int(drogue))
-        self._set("ssa_main_deployed", int(mode is Mode.MainDeployed))
+        self._set("ssa_main_deployed", int(mode is ComputerMode.MainDeployed))
         if drogue:
             self.rocket.drogue_out_for = self._drogue_out_for = 60.0
-        if mode is Mode.MainDeployed:
+        if mode is ComputerMode.MainDeployed:
             self.rocket.main_out_for = 60.0
         self._enter(mode)
 
@@ -150,13 +150,13 @@ class FlightProgram:
         rocket = self.rocket
         falls = rocket.vertical_speed < 0.0 and not self.drogue_fails
         is_low = rocket.height < MAIN_HEIGHT and self._drogue_out_for >= MAIN_DELAY
-        if self.mode is Mode.Ascent and not rocket.burning:
+        if self.mode is ComputerMode.Ascent and not rocket.burning:
             self._set("mav_open", 0)
-            self._enter(Mode.Coast)
-        elif self.mode is Mode.Coast and falls and self._fire_drogue():
-            self._enter(Mode.DrogueDeployed)
-        elif self.mode is Mode.DrogueDeployed and is_low and self._fire_main():
-            self._enter(Mode.MainDeployed)
+            self._enter(ComputerMode.Coast)
+        elif self.mode is ComputerMode.Coast and falls and self._fire_drogue():
+            self._enter(ComputerMode.DrogueDeployed)
+        elif self.mode is ComputerMode.DrogueDeployed and is_low and self._fire_main():
+            self._enter(ComputerMode.MainDeployed)
 
     def _fire_drogue(self) -> bool:
         if self.is_stuck:
@@ -179,7 +179,7 @@ class FlightProgram:
             self.rocket.release_main()
         return True
 
-    def _enter(self, mode: Mode) -> None:
+    def _enter(self, mode: ComputerMode) -> None:
         if mode is not self.mode:
             self._log("INFO", f"Flight mode {self.mode.name} -> {mode.name}")
             self.mode = mode
@@ -193,25 +193,25 @@ class FlightProgram:
         return lambda: self._set(name, 1)
 
     def _launch(self) -> None:
-        if self.mode is Mode.Standby:
+        if self.mode is ComputerMode.Standby:
             self._set("mav_open", 1)
             self.rocket.ignite()
-            self._enter(Mode.Ascent)
+            self._enter(ComputerMode.Ascent)
 
     def _safe(self) -> None:
         self._set("mav_open", 0)
         self._set("sv_open", int(self._settings.safe_opens_sv))
 
     def _arm(self) -> None:
-        if self.mode is Mode.Startup and self._settings.interlock and not self.may_arm:
+        if self.mode is ComputerMode.Startup and self._settings.interlock and not self.may_arm:
             self._print_line("Arming blocked: wipe flash first")
             return
         self._key = True
 
     def _manual_drogue(self) -> None:
-        if self._fire_drogue() and self.mode is Mode.Coast:
-            self._enter(Mode.DrogueDeployed)
+        if self._fire_drogue() and self.mode is ComputerMode.Coast:
+            self._enter(ComputerMode.DrogueDeployed)
 
     def _manual_main(self) -> None:
-        if self._fire_main() and self.mode is Mode.DrogueDeployed:
-            self._enter(Mode.MainDeployed)
+        if self._fire_main() and self.mode is ComputerMode.DrogueDeployed:
+            self._enter(ComputerMode.MainDeployed)

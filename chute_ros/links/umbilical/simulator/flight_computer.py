@@ -14,7 +14,7 @@ from chute_ros.links.umbilical.simulator.commands import NAMES, CommandReceiver
 from chute_ros.links.umbilical.simulator.flight import FlightProgram
 from chute_ros.links.umbilical.simulator.memory import Memory
 from chute_ros.links.umbilical.simulator.output import OutboundQueue
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 from chute_ros.links.umbilical.simulator.telemetry import (
     sensor_values,
     target_values,
@@ -27,7 +27,12 @@ from chute_ros.sim.acting import Actor, Script, one_of
 LOOP = 0.05
 #: A snapshot goes to the FRAM this often, in turns of the loop.
 _SNAPSHOT = 20
-_RECORDED = (Mode.Ascent, Mode.Coast, Mode.DrogueDeployed, Mode.MainDeployed)
+_RECORDED = (
+    ComputerMode.Ascent,
+    ComputerMode.Coast,
+    ComputerMode.DrogueDeployed,
+    ComputerMode.MainDeployed,
+)
 
 
 class FlightComputer(Actor):
@@ -71,14 +76,14 @@ class FlightComputer(Actor):
             "mend": lambda _: self._mend(),
             "fault": lambda _: self.flight.fail(),
             "reboot": lambda _: self.reboot(),
-            "jump": lambda name: self.flight.jump(Mode[name]),
+            "jump": lambda name: self.flight.jump(ComputerMode[name]),
             "land": lambda _: self.flight.rocket.land(),
             "wipe-fails": lambda _: setattr(self.memory, "wipe_outcome", "fails"),
             "wipe-hangs": lambda _: setattr(self.memory, "wipe_outcome", "hangs"),
             "lose-dump-end": lambda _: self.memory.disturb_dump("loses-end"),
             "dump-stalls": lambda _: self.memory.disturb_dump("stalls"),
         }
-        self.arguments = {"jump": one_of(Mode.__members__)}
+        self.arguments = {"jump": one_of(ComputerMode.__members__)}
         #: Those that are not for the flight program.
         self.commands_apart: dict[str, Callable[[], None]] = {
             "<R>": self.reboot,
@@ -158,7 +163,7 @@ class FlightComputer(Actor):
         return self.receiver.heartbeats
 
     @property
-    def mode(self) -> Mode:
+    def mode(self) -> ComputerMode:
         """Of the flight."""
         return self.flight.mode
 
@@ -210,7 +215,7 @@ class FlightComputer(Actor):
         self._cycles += 1
         if self.mode is not before:
             self.say(f"{before.name} -> {self.mode.name}")
-        if self.mode is not Mode.Startup and self._cycles % _SNAPSHOT == 0:
+        if self.mode is not ComputerMode.Startup and self._cycles % _SNAPSHOT == 0:
             self._snapshot()
 
     def _command(self, token: str) -> None:
@@ -238,7 +243,7 @@ class FlightComputer(Actor):
             self.say(text)
             self._log("INFO" if connected else "WARN", text.capitalize())
         seen, self._heartbeats_seen = self._heartbeats_seen, len(self.heartbeats)
-        rises = self.mode in (Mode.Ascent, Mode.Coast)
+        rises = self.mode in (ComputerMode.Ascent, ComputerMode.Coast)
         if self.settings.faults_on_heartbeat and rises and len(self.heartbeats) > seen:
             self.say("umbilical still connected in flight")
             self.flight.fail()

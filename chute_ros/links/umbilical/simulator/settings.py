@@ -9,7 +9,7 @@ from enum import IntEnum
 from chute_ros.errors import ParameterError
 
 
-class Mode(IntEnum):
+class ComputerMode(IntEnum):
     """Field flight_mode; the names are those of the flight computer."""
 
     Startup = 0

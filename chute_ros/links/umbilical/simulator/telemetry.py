@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from chute_ros.links.umbilical.protocol.fields import FieldType
 from chute_ros.links.umbilical.protocol.layouts import Layout
-from chute_ros.links.umbilical.simulator.settings import Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode
 from chute_ros.sim.rocket import GRAVITY, Rocket
 
 _F32 = struct.Struct("<f")
@@ -56,14 +56,14 @@ def telem_line(body: str) -> str:
     return f"$TELEM,{body}"
 
 
-def sensor_values(rocket: Rocket, mode: Mode) -> dict[str, float]:
+def sensor_values(rocket: Rocket, mode: ComputerMode) -> dict[str, float]:
     """What the sensors measure and what is computed from it alone, by field name."""
     air = rocket.air
     speed = math.hypot(rocket.speed_north, rocket.speed_east)
-    coasting = mode is Mode.Coast
+    coasting = mode is ComputerMode.Coast
     braking = 0.5 if coasting else 0.0
-    after = mode in (Mode.DrogueDeployed, Mode.MainDeployed)
-    steered = mode is Mode.MainDeployed and not rocket.on_ground
+    after = mode in (ComputerMode.DrogueDeployed, ComputerMode.MainDeployed)
+    steered = mode is ComputerMode.MainDeployed and not rocket.on_ground
     bearing = math.degrees(math.atan2(rocket.speed_east, rocket.speed_north)) % 360.0
     wind = math.degrees(math.atan2(-rocket.wind_east, -rocket.wind_north)) % 360.0
     return {

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench, first_of
+from chute_ros.conformance.bench import NotAllowedError, ReceivedPacket, RecordingBench, first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
@@ -18,8 +18,8 @@ from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.allocation import Allocator
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
-from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, TRANSFER_IDS, Kind
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, TRANSFER_IDS, TransferKind
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
 #: Node id of the vehicle that is simulated here, unless another is chosen.
@@ -59,10 +59,10 @@ A_TRIGGER = DeviceKind(names.TRIGGER_STATUS, "", TRIGGER_NODE_ID, (p.STATIC_NODE
 
 
 @dataclass(frozen=True)
-class HeardTransfer(HeardPacket):
+class TransferPacket(ReceivedPacket):
     """A message, request or response of the device."""
 
-    transfer: Heard
+    transfer: ReceivedTransfer
 
     @property
     def values(self) -> Mapping[str, Any]:
@@ -70,7 +70,7 @@ class HeardTransfer(HeardPacket):
         return self.transfer.values
 
 
-class UpfBench(RecordingBench[HeardTransfer]):
+class UpfBench(RecordingBench[TransferPacket]):
     """risk: the highest that the person allows; nothing above it is ever sent. node: of the
     device, 0: whoever tells its state. vehicle: the node id that is used here. dna: its own
     node id may be taken from it. device: what is tried; a trigger is told nothing unless it is."""
@@ -89,7 +89,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.definitions, self.soak, self.node = definitions, soak, 0
         self.device = device
         #: Of everybody on the bus.
-        self.every: list[HeardTransfer] = []
+        self.every: list[TransferPacket] = []
         #: Parameters that were changed -> what they were.
         self.changed: dict[str, p.Value] = {}
         #: From which of every it was told to deploy, or a trigger has fired; negative: it was not.
@@ -113,16 +113,20 @@ class UpfBench(RecordingBench[HeardTransfer]):
         if heard is None:
             return
         text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
-        label = heard.name if heard.kind is Kind.MESSAGE else f"{heard.name} {heard.kind.value}"
+        label = (
+            heard.name
+            if heard.kind is TransferKind.MESSAGE
+            else f"{heard.name} {heard.kind.value}"
+        )
         packet = self.noted(False, f"node {heard.source}", label, text, data)
-        one = HeardTransfer(now, heard.name, packet, heard)
+        one = TransferPacket(now, heard.name, packet, heard)
         self.every.append(one)
         if heard.source == self.node:
             self.heard.append(one)
             self.heard_at = now
             if one.kind == NODE_STATUS:
                 self.device_is_up(one.values["uptime_sec"], 2.0**32)
-        if heard.kind is Kind.REQUEST:
+        if heard.kind is TransferKind.REQUEST:
             self._answer(heard)
         elif heard.name == ALLOCATION and self.gives_out:
             self._allocate(heard)
@@ -148,13 +152,13 @@ class UpfBench(RecordingBench[HeardTransfer]):
         spoilt, self._spoilt = self._spoilt, []
         return [*spoilt, *self._endpoint.take_output()]
 
-    def _answer(self, request: Heard) -> None:
+    def _answer(self, request: ReceivedTransfer) -> None:
         """As a vehicle that obeys."""
         if request.name == names.VEHICLE_SERVICE:
             result = self.definitions.result(names.VEHICLE_SERVICE, "SUCCESS")
             self._endpoint.respond(request, result)
 
-    def _allocate(self, message: Heard) -> None:
+    def _allocate(self, message: ReceivedTransfer) -> None:
         """As the one allocator of the bus, whose table needs no keeping."""
         in_use = {one.transfer.source: b"" for one in self.every if one.transfer.source}
         self.allocator.heard(message.source, message.values, in_use, True, self.now)
@@ -206,10 +210,10 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self._spoilt += [*whole, *spoils(self._endpoint.take_output())]
 
     def _response(self, server: int, service: str, number: int) -> Any:
-        def answers(one: HeardTransfer) -> bool:
+        def answers(one: TransferPacket) -> bool:
             heard = one.transfer
             told = heard.kind, heard.source, heard.name, heard.transfer_id
-            return told == (Kind.RESPONSE, server, service, number)
+            return told == (TransferKind.RESPONSE, server, service, number)
 
         found = first_of(self.every, len(self.every), answers)
         yield Wait(self.now + ANSWER, found)
@@ -254,7 +258,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
             others = sorted({one.transfer.source for one in self.every})
             heard = ", ".join(map(str, others)) or "nobody"
             raise failed(
-                f"no {self.status} is received within {_FOUND_WITHIN:g} s (nodes heard: "
+                f"no {self.status} is received within {_FOUND_WITHIN:g} s (received from nodes: "
                 f"{heard}): check the bus and its bit rate, and the data types (--dsdl-path)"
             )
         self.heard = [one for one in self.every if one.transfer.source == self.node]
@@ -269,7 +273,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
 
     def _teller(
         self, since: int, fits: Callable[[int], bool]
-    ) -> Callable[[], HeardTransfer | None]:
+    ) -> Callable[[], TransferPacket | None]:
         """The first that tells the state of such a device, from this place of every on, of a node
         that fits."""
         status = self.device.status
@@ -411,7 +415,7 @@ class UpfBench(RecordingBench[HeardTransfer]):
         self.node = self._home
         return (yield from self.is_up(_AWAY))
 
-    def state_in(self, status: HeardTransfer) -> ParachuteState | None:
+    def state_in(self, status: TransferPacket) -> ParachuteState | None:
         """The state in its status; None: a number without a name, or the types do not tell it."""
         name = self.definitions.state_name(status.kind, status.values)
         return ParachuteState.__members__.get(name)
@@ -437,6 +441,6 @@ class UpfBench(RecordingBench[HeardTransfer]):
         return (yield from self.wait_for(self.device.status, within)) is not None
 
 
-def _node_of(one: HeardTransfer | None) -> int:
+def _node_of(one: TransferPacket | None) -> int:
     """Who sent it; 0: nobody."""
     return 0 if one is None else one.transfer.source

@@ -7,7 +7,7 @@ from functools import partial
 
 from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import HeardTransfer, UpfBench
+from chute_ros.links.upf.conformance.bench import TransferPacket, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -23,7 +23,6 @@ _TOLD_WITHIN, FIRES_WITHIN = 1.5, 4.0
 _WAITS = 3.0
 #: At rest for 5 s, and a while to tell.
 _RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
-_AUTOMATIC = (p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND)
 _UNKNOWN_TYPE = 200
 
 
@@ -76,7 +75,7 @@ def _excludes(type_name: str) -> UpfClause:
 
 def _by_hand(bench: UpfBench) -> Trial:
     """Nothing moves by itself, and it is READY."""
-    for name in _AUTOMATIC:
+    for name in p.AUTOMATIC:
         if (yield from bench.set(name, False)) is not False:
             raise failed(f"{name} cannot be switched off")
     for request in ("TYPE_DISARM", "TYPE_LAND"):
@@ -169,7 +168,7 @@ def _launches(bench: UpfBench, since: int) -> list[float]:
     return [one.at for one in bench.every[since:] if one.kind in kinds]
 
 
-def _tells_launched(bench: UpfBench, one: HeardTransfer) -> bool:
+def _tells_launched(bench: UpfBench, one: TransferPacket) -> bool:
     """Of the controller, that it is LAUNCHED."""
     if one.kind != names.PARACHUTE_STATUS or one.transfer.source != bench.node:
         return False

@@ -6,7 +6,7 @@ from typing import Any
 
 from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import DNA, HeardTransfer, UpfBench
+from chute_ros.links.upf.conformance.bench import DNA, TransferPacket, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
@@ -55,7 +55,7 @@ def _forgets(bench: UpfBench) -> Trial:
     bench.gives_out = False
     yield from bench.save_and_restart()
 
-    def asks(one: HeardTransfer) -> bool:
+    def asks(one: TransferPacket) -> bool:
         return one.kind == ALLOCATION and unique_id.startswith(bytes(one.values["unique_id"]))
 
     asked = first_of(bench.every, since, asks)

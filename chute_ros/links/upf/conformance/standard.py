@@ -18,7 +18,7 @@ from chute_ros.conformance.clause import (
     not_supported,
     not_tried,
 )
-from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, UpfBench
+from chute_ros.links.upf.conformance.bench import NODE_STATUS, TransferPacket, UpfBench
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -53,7 +53,7 @@ def _mean(bench: UpfBench, kind: str) -> float:
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
-def _node_statuses(bench: UpfBench) -> list[HeardTransfer]:
+def _node_statuses(bench: UpfBench) -> list[TransferPacket]:
     """Of what was watched."""
     return [one for one in bench.watched if one.kind == NODE_STATUS]
 
@@ -64,7 +64,7 @@ def _longest_pause(bench: UpfBench, watched: float) -> float:
     return max(gaps, default=watched)
 
 
-def _begins_anew(statuses: Iterable[HeardTransfer]) -> bool:
+def _begins_anew(statuses: Iterable[TransferPacket]) -> bool:
     """The time since its start goes back in one of these NodeStatus."""
     uptimes = [one.values["uptime_sec"] for one in statuses]
     return any(later < earlier for earlier, later in pairwise(uptimes))
@@ -97,7 +97,7 @@ def node_id(bench: UpfBench) -> Trial:
     """That of the document, as it is delivered."""
     default = yield from bench.value(p.STATIC_NODE_ID, "default_value")
     if default != bench.device.node_id:
-        raise failed(f"its static node id as delivered is {p.words(default) or 'not told'}")
+        raise failed(f"its static node id as delivered is {p.words(default) or 'not reported'}")
     return f"as delivered {default}; it is {bench.node}"
 
 
@@ -134,7 +134,7 @@ def _uptime(bench: UpfBench) -> Trial:
 def _status_interval(bench: UpfBench) -> Trial:
     told = yield from bench.value(p.PARACHUTE_STATUS_INTERVAL)
     if not isinstance(told, (int, float)) or isinstance(told, bool):
-        raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
+        raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not reported'}")
     yield from bench.watch_once(WATCHED, names.PARACHUTE_STATUS)
     mean = _mean(bench, names.PARACHUTE_STATUS)
     if abs(mean - told / 1000.0) > max(_SHARE * told / 1000.0, _LEAST):
@@ -207,7 +207,7 @@ def _unknown(bench: UpfBench) -> Trial:
 def _resistor(bench: UpfBench) -> Trial:
     default = yield from bench.value(p.CANBUS_RESISTER, "default_value")
     if default is None or p.as_switch(default):
-        raise failed(f"as delivered it is {p.words(default) or 'not told'} (need off)")
+        raise failed(f"as delivered it is {p.words(default) or 'not reported'} (need off)")
     return "off"
 
 
@@ -225,7 +225,7 @@ def _set_interval(bench: UpfBench, name: str, wanted: int, kind: str) -> Trial:
         yield from bench.watch(8.0 * wanted / 1000.0)
     yield from bench.put_back(name)
     if told != wanted:
-        raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not told'}")
+        raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not reported'}")
     mean = _mean(bench, kind)
     if abs(mean - wanted / 1000.0) > max(_SHARE * wanted / 1000.0, _LEAST):
         raise failed(f"{wanted} ms were set, and it comes each {mean:.3f} s", bench.packets(kind))
@@ -238,7 +238,7 @@ def _range(bench: UpfBench) -> Trial:
     answer = yield from bench.get(name)
     before = None if answer is None else p.value_of(answer["value"])
     if before is None:
-        raise failed(f"{name} is not told")
+        raise failed(f"{name} is not reported")
     low, high = p.value_of(answer["min_value"]), p.value_of(answer["max_value"])
     became = []
     for wrong in (-5, 10**9):
@@ -248,7 +248,7 @@ def _range(bench: UpfBench) -> Trial:
             raise failed(f"{name} takes {wrong}")
         if told != before and not _within(told, low, high):
             raise failed(
-                f"{name} was set to {wrong}, and {before} became {p.words(told) or 'not told'}"
+                f"{name} was set to {wrong}, and {before} became {p.words(told) or 'not reported'}"
             )
         became.append(p.words(told))
     return f"{name} set to -5 and 1000000000 is {' and '.join(became)}"
@@ -297,15 +297,15 @@ def _restart(bench: UpfBench) -> Trial:
         raise failed("RestartNode is not ok")
     yield from bench.reaches(ParachuteState.NOT_READY, 5.0)
     is_up = yield from bench.is_up(READY_WITHIN)
-    up = bench.device.up or "heard"
+    up = bench.device.up or "received"
     yield from bench.watch_on(0.5)
     yield Wait(bench.now + _LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
     if not is_up:
         raise failed(f"it is not {up} within {READY_WITHIN:g} s")
     if bench.starts == starts:
-        raise failed("uptime_sec does not begin anew", bench.packets(NODE_STATUS)[:2])
-    return f"it starts anew, and is {up}"
+        raise failed("uptime_sec does not begin at 0 again", bench.packets(NODE_STATUS)[:2])
+    return f"it restarts, and is {up}"
 
 
 def _blocks_at_start(bench: UpfBench) -> Trial:
@@ -324,7 +324,7 @@ def _asked(bench: UpfBench, what: str, state: ParachuteState) -> str:
     kinds = (service, names.PARACHUTE_STATUS)
     told = bench.look_at(one for one in bench.watched if one.kind in kinds)
     if not any(one.values["state"] == number for one in told if one.kind != service):
-        raise not_tried("it was not seen to start anew")
+        raise not_tried("it was not seen to restart")
     asked = [
         bench.definitions.type_name(service, one.values) for one in told if one.kind == service
     ]
@@ -377,7 +377,7 @@ def _time_sync(bench: UpfBench) -> Trial:
     after = yield from bench.state()
     if after is not before:
         raise failed(f"the time of the bus moved it from {before} to {after}")
-    return "it goes on; nothing that it tells shows the time that it has"
+    return "it goes on; nothing that it reports shows the time that it has"
 
 
 def _soak(bench: UpfBench) -> Trial:
@@ -386,7 +386,7 @@ def _soak(bench: UpfBench) -> Trial:
     if longest > _LONGEST_STATUS * (1.0 + _SHARE):
         raise failed(f"NodeStatus paused for {longest:.1f} s", bench.packets(NODE_STATUS)[-5:])
     if _begins_anew(_node_statuses(bench)):
-        raise failed("it started anew meanwhile", bench.packets(NODE_STATUS)[-5:])
+        raise failed("it restarted meanwhile", bench.packets(NODE_STATUS)[-5:])
     return f"{bench.soak:g} s"
 
 
@@ -401,7 +401,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _node_mode,
         READS,
     ),
-    clause(_STANDARD, "uptime", "NodeStatus tells the time since its start", _uptime, READS),
+    clause(_STANDARD, "uptime", "NodeStatus reports the time since its start", _uptime, READS),
     clause(
         "UPF protocols",
         "status-interval",
@@ -410,7 +410,7 @@ CLAUSES: tuple[UpfClause, ...] = (
     ),
     clause(_STATES, "state-known", "its state is one of the seven", state_known, READS),
     clause(_NODE, "node-id", "the static node id as delivered is 33", node_id),
-    clause(_STANDARD, "node-info", "GetNodeInfo tells who it is", _information),
+    clause(_STANDARD, "node-info", "GetNodeInfo reports who it is", _information),
     clause(_STANDARD, "transport-stats", "GetTransportStats is answered", _statistics),
     clause(_PARAMETERS, "parameters", "it has each parameter of the document", _present),
     clause(_PARAMETERS, "parameter-kinds", "each is of its kind", _kinds),
@@ -440,7 +440,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _restart_refused,
         "it must not, but it may restart",
     ),
-    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS, restarts=True),
+    clause(_STANDARD, "restart", "RestartNode restarts it", _restart, _RESTARTS, restarts=True),
     clause(
         _STATES,
         "block-at-start",
@@ -464,7 +464,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         restarts=True,
     ),
     clause(
-        _STANDARD, "time-sync", "GlobalTimeSync does it no harm", _time_sync, "it is told a time"
+        _STANDARD, "time-sync", "GlobalTimeSync does it no harm", _time_sync, "it is sent a time"
     ),
     clause(
         "Over hours",

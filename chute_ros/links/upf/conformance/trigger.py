@@ -14,7 +14,7 @@ from chute_ros.links.upf.conformance import node_id, standard, wire
 from chute_ros.links.upf.conformance.bench import (
     STATUS_WITHIN,
     TRIGGER,
-    HeardTransfer,
+    TransferPacket,
     UpfBench,
 )
 from chute_ros.links.upf.conformance.flying import FIRES_WITHIN, MAY_FIRE
@@ -31,13 +31,13 @@ SHARED = (
 _EVERY = "every trigger on the bus"
 
 
-def _fired(bench: UpfBench, status: HeardTransfer) -> bool:
+def _fired(bench: UpfBench, status: TransferPacket) -> bool:
     """It tells that it has fired."""
     state = bench.definitions.state_name(status.kind, status.values)
     return bool(status.values.get("is_launched")) or state == "LAUNCHED"
 
 
-def _statuses(bench: UpfBench, since: int) -> list[HeardTransfer]:
+def _statuses(bench: UpfBench, since: int) -> list[TransferPacket]:
     """From this place of heard on."""
     return [one for one in bench.heard[since:] if one.kind == names.TRIGGER_STATUS]
 
@@ -53,7 +53,7 @@ def _can_fire(bench: UpfBench) -> Trial:
     if not told:
         raise not_tried("no TriggerStatus is received")
     if not {"state", "is_launched"} & set(told[-1].values):
-        raise not_tried("the data types do not tell whether it has fired")
+        raise not_tried("the data types do not report whether it has fired")
     if _fired(bench, told[-1]):
         if bench.deployed_from < 0 and not _fired(bench, _statuses(bench, 0)[0]):
             bench.deployed_from = len(bench.every)
@@ -67,7 +67,7 @@ def _can_fire(bench: UpfBench) -> Trial:
 def _fires(bench: UpfBench, since: int) -> Any:
     """The first status from this place of heard on that tells it; None: none does in time."""
 
-    def fits(one: HeardTransfer) -> bool:
+    def fits(one: TransferPacket) -> bool:
         return one.kind == names.TRIGGER_STATUS and _fired(bench, one)
 
     told = first_of(bench.heard, since, fits)
@@ -102,7 +102,7 @@ def _status(bench: UpfBench) -> Trial:
     for _ in range(2):
         if (yield from bench.wait_for(names.TRIGGER_STATUS, STATUS_WITHIN)) is None:
             raise failed(f"no TriggerStatus within {STATUS_WITHIN:g} s")
-    return "told again and again"
+    return "reported again and again"
 
 
 def _wrong(magic: Any) -> int:
@@ -267,7 +267,7 @@ CLAUSES: tuple[UpfClause, ...] = (
     _may_fire(
         _TYPES,
         "trigger-broadcast",
-        "TriggerLaunch fires it, and TriggerStatus tells it",
+        "TriggerLaunch fires it, and TriggerStatus reports it",
         _broadcast,
         f"IT FIRES, and so does {_EVERY}",
         needs=f"{TRIGGER} {BROADCAST}",
@@ -275,7 +275,7 @@ CLAUSES: tuple[UpfClause, ...] = (
     _may_fire(
         _TYPES,
         "trigger-launch",
-        "TriggerService: TYPE_LAUNCH fires it, and TriggerStatus tells it",
+        "TriggerService: TYPE_LAUNCH fires it, and TriggerStatus reports it",
         _launch,
         "IT FIRES",
     ),

@@ -12,7 +12,7 @@ from chute_ros.links.upf.conformance.standard import UpfClause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.dronecan.transfer import Kind, frames_of, head_of
+from chute_ros.protocol.dronecan.transfer import TransferKind, frames_of, head_of
 
 _DOCUMENT, _SECTION = "DroneCAN specification", "CAN bus transport layer"
 #: What is set by frames that are spoilt, ms: other than as delivered.
@@ -54,7 +54,7 @@ def _damaged(frames: list[bytes]) -> list[bytes]:
 def _foreign(frames: list[bytes]) -> list[bytes]:
     """Of types that nobody has, of another protocol, and without a tail byte, in their place."""
     first = _first(frames)
-    message = replace(head_of(first), kind=Kind.MESSAGE, destination=0, payload=bytes(3))
+    message = replace(head_of(first), kind=TransferKind.MESSAGE, destination=0, payload=bytes(3))
     messages = [frames_of(replace(message, type_id=one), 0)[0] for one in _NOBODYS_TYPES]
     others = [CanFrame(0x123, bytes(8), extended=False), CanFrame(first.identifier, b"")]
     return [pack(one) for one in (*messages, *others)]
@@ -67,7 +67,7 @@ def _spoilt(
     name = p.NODE_STATUS_INTERVAL
     before = yield from bench.value(name)
     if before is None:
-        raise not_tried(f"{name} is not told")
+        raise not_tried(f"{name} is not reported")
     bench.send_spoilt(name, _SPOILT, before, spoils)
     yield from bench.watch_on(ANSWER)
     after = yield from bench.value(name)
@@ -86,7 +86,7 @@ def _other_node(bench: UpfBench) -> Trial:
     since = len(bench.heard)
     yield from bench.call(bus_requests.GET_NODE_INFO, {}, 1, node=other)
     for one in bench.heard[since:]:
-        if one.transfer.kind is Kind.RESPONSE:
+        if one.transfer.kind is TransferKind.RESPONSE:
             raise failed(f"a request to node {other} is answered", [one.packet])
     return f"a request to node {other} is not answered"
 

@@ -19,7 +19,7 @@ from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.links.upf.protocol.devices import Controller, Trigger
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
-from chute_ros.links.upf.protocol.vehicle_status import Vehicle
+from chute_ros.links.upf.protocol.vehicle_status import VehicleStatusSender
 from chute_ros.model import LinkState, Outcome
 from chute_ros.protocol.dronecan.calls import Call, ServiceCalls
 from chute_ros.protocol.dronecan.endpoint import Endpoint
@@ -50,7 +50,7 @@ class Deploying:
         devices: DeviceTable,
         requests: Requests[ServiceCalls],
         endpoint: Endpoint,
-        vehicle: Vehicle,
+        vehicle: VehicleStatusSender,
         service: VehicleService,
     ) -> None:
         self._config, self._devices = config, devices

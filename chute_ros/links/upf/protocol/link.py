@@ -21,13 +21,13 @@ from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.links.upf.protocol.devices import Controller
 from chute_ros.links.upf.protocol.events import UpfEvent
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
-from chute_ros.links.upf.protocol.vehicle_status import Vehicle
+from chute_ros.links.upf.protocol.vehicle_status import VehicleStatusSender
 from chute_ros.model import Armed, ParachuteState, TriggerFlags, VehicleState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS, BusNode
 from chute_ros.protocol.dronecan.calls import Call, ServiceCalls
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.protocol.events import RequestFinished, RequestReport, Severity
 from chute_ros.protocol.goal import EffectFinished
 from chute_ros.protocol.requests import Requests
@@ -46,7 +46,7 @@ class UpfLink:
         calls = ServiceCalls(config.calls, read)
         self.requests: Requests[ServiceCalls] = Requests(calls, config.effect)
         endpoint = self.bus.endpoint
-        self._vehicle = Vehicle(config, self.devices, endpoint)
+        self._vehicle = VehicleStatusSender(config, self.devices, endpoint)
         self._deploying = Deploying(
             config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
         )
@@ -254,12 +254,12 @@ class UpfLink:
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _heard(self, heard: Heard, now: float) -> None:
-        if heard.kind is Kind.RESPONSE:
+    def _heard(self, heard: ReceivedTransfer, now: float) -> None:
+        if heard.kind is TransferKind.RESPONSE:
             self.requests.commands.response(
                 heard.source, heard.name, heard.transfer_id, heard.values, now
             )
-        elif heard.kind is Kind.REQUEST:
+        elif heard.kind is TransferKind.REQUEST:
             if heard.name == names.VEHICLE_SERVICE:
                 self.vehicle_service.request(heard, now)
             else:

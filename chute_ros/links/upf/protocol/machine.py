@@ -13,7 +13,7 @@ import enum
 from chute_ros.model import ParachuteState
 
 
-class Event(enum.Enum):
+class ControllerEvent(enum.Enum):
     """Event that moves a controller."""
 
     SELF_TEST_PASSED = "self test passed"
@@ -29,9 +29,9 @@ class Event(enum.Enum):
     RESTART = "restart"
 
 
-_S, _E = ParachuteState, Event
+_S, _E = ParachuteState, ControllerEvent
 
-TRANSITIONS: dict[tuple[ParachuteState, Event], ParachuteState] = {
+TRANSITIONS: dict[tuple[ParachuteState, ControllerEvent], ParachuteState] = {
     (_S.NOT_READY, _E.SELF_TEST_PASSED): _S.READY,
     (_S.NOT_READY, _E.SELF_TEST_FAILED): _S.ABNORMAL,
     (_S.READY, _E.TAKEOFF): _S.TAKEOFF,
@@ -76,7 +76,7 @@ def _reached(before: ParachuteState) -> frozenset[ParachuteState]:
     while left:
         here = left.pop()
         for (state, event), following in TRANSITIONS.items():
-            if state is here and event is not Event.RESTART and following not in reached:
+            if state is here and event is not ControllerEvent.RESTART and following not in reached:
                 reached.add(following)
                 left.append(following)
     return frozenset(reached)

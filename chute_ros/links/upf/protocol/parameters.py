@@ -73,6 +73,8 @@ EXCLUDES: Mapping[str, str] = {
     "TYPE_DISARM": AUTO_DISARM,
     "TYPE_LAND": AUTO_LAND,
 }
+#: While all of these are off nothing moves a controller on but requests.
+AUTOMATIC = tuple(EXCLUDES.values())
 #: Switching one of these off takes protection away.
 PROTECTION = (ENABLE_PARACHUTE, ENABLE_APS)
 

@@ -17,8 +17,8 @@ from chute_ros.links.upf.protocol.config import Policy, UpfConfig
 from chute_ros.links.upf.protocol.definitions import VEHICLE_SERVICE, Definitions
 from chute_ros.links.upf.protocol.machine import BLOCKING
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.events import Ask, AskSupervisor
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
+from chute_ros.protocol.events import AskSupervisor, SafetyAsk
 
 #: A kill that was confirmed, or waited for, so lately (s) answers a request that comes after it.
 KILL_MEMORY = 5.0
@@ -40,9 +40,9 @@ MOST_PENDING = 32
 
 
 _ASKS = {
-    "TYPE_KILLSWITCH": Ask.KILL,
-    "TYPE_FLIGHT_BLOCK": Ask.FLIGHT_BLOCK,
-    "TYPE_FLIGHT_BLOCK_RELEASE": Ask.FLIGHT_BLOCK_RELEASE,
+    "TYPE_KILLSWITCH": SafetyAsk.KILL,
+    "TYPE_FLIGHT_BLOCK": SafetyAsk.FLIGHT_BLOCK,
+    "TYPE_FLIGHT_BLOCK_RELEASE": SafetyAsk.FLIGHT_BLOCK_RELEASE,
 }
 
 
@@ -50,20 +50,20 @@ _ASKS = {
 class Response:
     """Answer this request so; result: name of a RESULT_* constant without the prefix."""
 
-    request: Heard
+    request: ReceivedTransfer
     result: str
 
 
 @dataclass
 class _Pending:
-    request: Heard
-    ask: Ask
+    request: ReceivedTransfer
+    ask: SafetyAsk
     until: float
     ask_again: float
 
 
 def _kill_asked(device: str) -> AskSupervisor:
-    return AskSupervisor(Ask.KILL, device, "it is about to launch (TYPE_KILLSWITCH)")
+    return AskSupervisor(SafetyAsk.KILL, device, "it is about to launch (TYPE_KILLSWITCH)")
 
 
 class VehicleService:
@@ -95,7 +95,7 @@ class VehicleService:
 
     # -- what devices say -----------------------------------------------------------------------
 
-    def request(self, request: Heard, now: float) -> None:
+    def request(self, request: ReceivedTransfer, now: float) -> None:
         """A VehicleService request came."""
         name = self._definitions.type_name(VEHICLE_SERVICE, request.values)
         device = str(request.source)
@@ -114,14 +114,16 @@ class VehicleService:
             return
         self.counts[f"{name} received"] += 1
         self._heard_at[device] = now
-        policy = config.kill_policy if ask is Ask.KILL else config.flight_block_policy
+        policy = config.kill_policy if ask is SafetyAsk.KILL else config.flight_block_policy
         if policy is Policy.REJECT:
             self._respond(request, "REJECTED")
             return
-        if ask is Ask.KILL:
+        if ask is SafetyAsk.KILL:
             self._asks.append(_kill_asked(device))
         else:
-            self._want(device, f"requested by {name}" if ask is Ask.FLIGHT_BLOCK else "", now)
+            self._want(
+                device, f"requested by {name}" if ask is SafetyAsk.FLIGHT_BLOCK else "", now
+            )
         if policy is Policy.ACCEPT:
             self._respond(request, "SUCCESS")
             return
@@ -190,14 +192,14 @@ class VehicleService:
             self.counts[f"{one.ask.name} not done in time"] += 1
             self._respond(one.request, "FAILED")
         for one in self._pending:
-            if one.ask is Ask.KILL and now >= one.ask_again:
+            if one.ask is SafetyAsk.KILL and now >= one.ask_again:
                 # A supervisor that has just started has not heard it.
                 one.ask_again = now + _ASK_AGAIN
                 self._asks.append(_kill_asked(str(one.request.source)))
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
-        kills = (one.ask_again for one in self._pending if one.ask is Ask.KILL)
+        kills = (one.ask_again for one in self._pending if one.ask is SafetyAsk.KILL)
         return min((*kills, *(one.until for one in self._pending)), default=math.inf)
 
     def take_asks(self) -> list[AskSupervisor]:
@@ -220,18 +222,18 @@ class VehicleService:
         self._said_at[device] = now
         if reason:
             self._blocks[device] = reason
-            self._asks.append(AskSupervisor(Ask.FLIGHT_BLOCK, device, reason))
+            self._asks.append(AskSupervisor(SafetyAsk.FLIGHT_BLOCK, device, reason))
         else:
             self._blocks.pop(device, None)
             self._released.add(device)
             text = "the device no longer requests it"
-            self._asks.append(AskSupervisor(Ask.FLIGHT_BLOCK_RELEASE, device, text))
+            self._asks.append(AskSupervisor(SafetyAsk.FLIGHT_BLOCK_RELEASE, device, text))
 
     def _happened(self, one: _Pending, now: float) -> bool:
         device = str(one.request.source)
-        if one.ask is Ask.KILL:
+        if one.ask is SafetyAsk.KILL:
             return now - self.kill_confirmed_at <= KILL_MEMORY
-        if one.ask is Ask.FLIGHT_BLOCK:
+        if one.ask is SafetyAsk.FLIGHT_BLOCK:
             return self._blocked and device in self._standing
         return device not in self._standing
 
@@ -241,10 +243,10 @@ class VehicleService:
             self._respond(one.request, "SUCCESS")
         if now - self._kill_waited_for <= KILL_MEMORY:
             for one in self._pending:
-                if one.ask is Ask.KILL:
+                if one.ask is SafetyAsk.KILL:
                     one.until = min(one.until, now + _WORD_ON_ITS_WAY)
 
-    def _respond(self, request: Heard, result: str) -> None:
+    def _respond(self, request: ReceivedTransfer, result: str) -> None:
         name = self._definitions.type_name(VEHICLE_SERVICE, request.values) or "bad request"
         self.newest_answer = f"{name} of {request.source}: {result}"
         self.counts[f"answered {result}"] += 1

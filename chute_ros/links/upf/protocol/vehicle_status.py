@@ -22,7 +22,7 @@ _LARGEST = 60000.0
 _FLYING = (ParachuteState.TAKEOFF, ParachuteState.ARMED)
 
 
-class Vehicle:
+class VehicleStatusSender:
     """Keeps what the vehicle says of itself, and tells it to the controllers."""
 
     def __init__(self, config: UpfConfig, devices: DeviceTable, endpoint: Endpoint) -> None:

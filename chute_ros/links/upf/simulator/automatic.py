@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.machine import Event
+from chute_ros.links.upf.protocol.machine import ControllerEvent
 from chute_ros.model import ParachuteState
 from chute_ros.sim.motion import Motion
 
@@ -57,22 +57,22 @@ class AutomaticFunctions:
 
     def wish(
         self, state: ParachuteState, motion: Motion, switch: Callable[[str], bool], now: float
-    ) -> Event | None:
+    ) -> ControllerEvent | None:
         """What an enabled function wants in this state; None: nothing."""
         height = motion.height
         if state is _S.READY and switch(p.AUTO_TAKEOFF):
             if height >= _TAKEOFF_HEIGHT:
-                return Event.TAKEOFF
+                return ControllerEvent.TAKEOFF
         elif state is _S.TAKEOFF:
             if height >= _ARM_HEIGHT and switch(p.AUTO_ARM):
-                return Event.ARM
+                return ControllerEvent.ARM
             rests = self._flown and self.at_rest_for(now) >= _LAND_TIME
             if rests and height < _GROUND and switch(p.AUTO_LAND):
-                return Event.LAND
+                return ControllerEvent.LAND
         elif state is _S.ARMED and switch(p.AUTO_DISARM):
             calm = motion.vertical_speed > -_CALM_SINK_SPEED
             if self._was_high and height < _DISARM_HEIGHT and calm:
-                return Event.DISARM
+                return ControllerEvent.DISARM
         return None
 
 

@@ -13,7 +13,7 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.protocol.machine import Event
+from chute_ros.links.upf.protocol.machine import ControllerEvent
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.spoilt import WIRE_BREAKS, SpoiltRequests
@@ -24,8 +24,8 @@ from chute_ros.links.upf.simulator.trigger import (
 )
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
-from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.dronecan.transfer import Kind, head_of
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
+from chute_ros.protocol.dronecan.transfer import TransferKind, head_of
 
 _S = ParachuteState
 #: It falls silent so long after its first start, for so long, s.
@@ -47,10 +47,10 @@ _ANSWERS = {
 }
 #: The state that it leaves by itself though this is off, and how.
 _BY_ITSELF = {
-    "no-auto-takeoff": (_S.READY, p.AUTO_TAKEOFF, Event.TAKEOFF),
-    "no-auto-arm": (_S.TAKEOFF, p.AUTO_ARM, Event.ARM),
-    "no-auto-disarm": (_S.ARMED, p.AUTO_DISARM, Event.DISARM),
-    "no-auto-land": (_S.TAKEOFF, p.AUTO_LAND, Event.LAND),
+    "no-auto-takeoff": (_S.READY, p.AUTO_TAKEOFF, ControllerEvent.TAKEOFF),
+    "no-auto-arm": (_S.TAKEOFF, p.AUTO_ARM, ControllerEvent.ARM),
+    "no-auto-disarm": (_S.ARMED, p.AUTO_DISARM, ControllerEvent.DISARM),
+    "no-auto-land": (_S.TAKEOFF, p.AUTO_LAND, ControllerEvent.LAND),
 }
 #: What it does not ask of the vehicle.
 _NOT_ASKED = {
@@ -112,7 +112,7 @@ class BrokenNode(UpfNode):
         frame = unpack(data)
         if frame is None or not frame.extended or not frame.data:
             return data
-        if head_of(frame).kind is not Kind.REQUEST:
+        if head_of(frame).kind is not TransferKind.REQUEST:
             return data
         identifier = frame.identifier & ~0x7F00 | self.node_id << 8
         return pack(replace(frame, identifier=identifier))
@@ -166,8 +166,8 @@ class BrokenController(BrokenNode, UpfController):
         turned = result == "SUCCESS" and self.breaks == _ANSWERS.get(name)
         return "FAILED" if turned else result
 
-    def _move(self, event: Event) -> None:
-        if event is not Event.AT_REST or self.breaks != "touchdown":
+    def _move(self, event: ControllerEvent) -> None:
+        if event is not ControllerEvent.AT_REST or self.breaks != "touchdown":
             super()._move(event)
 
     def _ask_vehicle(self, type_name: str) -> int:
@@ -210,7 +210,7 @@ NodeT = TypeVar("NodeT", bound=BrokenNode)
 
 
 def _answers(
-    service: str, change: Callable[[NodeT, Heard, Any], Answer]
+    service: str, change: Callable[[NodeT, ReceivedTransfer, Any], Answer]
 ) -> Callable[[NodeT], None]:
     """It answers a request otherwise: change gets the right answer."""
 
@@ -224,13 +224,13 @@ def _answers(
 def _parameter(name: str, **told: Any) -> Callable[[BrokenNode], None]:
     """It tells this parameter otherwise, by its name."""
 
-    def change(_: BrokenNode, request: Heard, answer: Any) -> Answer:
+    def change(_: BrokenNode, request: ReceivedTransfer, answer: Any) -> Answer:
         return {**answer, **told} if _named(request) == name else answer
 
     return _answers(bus_requests.GET_SET, change)
 
 
-def _named(request: Heard) -> str:
+def _named(request: ReceivedTransfer) -> str:
     return bytes(request.values["name"]).decode()
 
 
@@ -266,25 +266,25 @@ def _is_slow(device: BrokenNode) -> None:
     )
 
 
-def _no_id(_: BrokenNode, request: Heard, answer: Any) -> Answer:
+def _no_id(_: BrokenNode, request: ReceivedTransfer, answer: Any) -> Answer:
     return {**answer, "hardware_version": {"major": 3, "unique_id": bytes(16)}}
 
 
-def _lacks_light(_: BrokenController, request: Heard, answer: Any) -> Answer:
+def _lacks_light(_: BrokenController, request: ReceivedTransfer, answer: Any) -> Answer:
     return {} if _named(request) == p.LIGHT else answer
 
 
-def _endless(device: BrokenNode, request: Heard, answer: Any) -> Answer:
+def _endless(device: BrokenNode, request: ReceivedTransfer, answer: Any) -> Answer:
     at_end = not _named(request) and not answer
     return device.memory.answer(p.LIGHT) if at_end else answer
 
 
-def _any_name(device: BrokenNode, request: Heard, answer: Any) -> Answer:
+def _any_name(device: BrokenNode, request: ReceivedTransfer, answer: Any) -> Answer:
     known = bool(answer) or not _named(request)
     return answer if known else device.memory.answer(p.LIGHT)
 
 
-def _takes_all(device: BrokenController, request: Heard, answer: Any) -> Answer:
+def _takes_all(device: BrokenController, request: ReceivedTransfer, answer: Any) -> Answer:
     wanted, told = p.value_of(request.values["value"]), dict(answer)
     if wanted is not None and told:
         device.memory.values[_named(request)] = wanted
@@ -320,7 +320,7 @@ def _pace(device: BrokenNode, name: str) -> float:
     return float(told) / 1000.0 * (3.0 if told == delivered else 1.0)
 
 
-def _is_type(device: UpfNode, request: Heard, name: str) -> bool:
+def _is_type(device: UpfNode, request: ReceivedTransfer, name: str) -> bool:
     """A TriggerService request of this type; empty: one that is none."""
     service = names.TRIGGER_SERVICE
     is_good = device.definitions.magic_is_good(service, request.values)
@@ -340,7 +340,7 @@ def _says_yes(type_name: str) -> Callable[[BrokenTrigger], None]:
     return apply
 
 
-def _fires_by_test(device: BrokenTrigger, request: Heard, answer: Any) -> Answer:
+def _fires_by_test(device: BrokenTrigger, request: ReceivedTransfer, answer: Any) -> Answer:
     if _is_type(device, request, "TYPE_SELF_TEST"):
         device.fire("its self test")
     return dict(answer)

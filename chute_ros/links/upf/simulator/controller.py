@@ -15,7 +15,7 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import machine
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.protocol.machine import Event
+from chute_ros.links.upf.protocol.machine import ControllerEvent
 from chute_ros.links.upf.simulator.automatic import (
     ApsLimits,
     AutomaticDeployment,
@@ -27,7 +27,7 @@ from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.peers import Peers
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call
-from chute_ros.protocol.dronecan.endpoint import Heard
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 from chute_ros.sim.acting import one_of
 from chute_ros.sim.motion import Motion
 from chute_ros.transitions import after
@@ -39,10 +39,10 @@ _STEP = 0.02  # s
 _S = ParachuteState
 #: The state that a request asks for.
 _ASKED_FOR = {
-    Event.TAKEOFF: _S.TAKEOFF,
-    Event.ARM: _S.ARMED,
-    Event.DISARM: _S.TAKEOFF,
-    Event.LAND: _S.READY,
+    ControllerEvent.TAKEOFF: _S.TAKEOFF,
+    ControllerEvent.ARM: _S.ARMED,
+    ControllerEvent.DISARM: _S.TAKEOFF,
+    ControllerEvent.LAND: _S.READY,
 }
 
 
@@ -116,14 +116,16 @@ class UpfController(UpfNode):
         self._step_at = now + _STEP
         if self.state is _S.NOT_READY and now >= self._ready_at:
             passed = not self.errors
-            self._move(Event.SELF_TEST_PASSED if passed else Event.SELF_TEST_FAILED)
+            self._move(
+                ControllerEvent.SELF_TEST_PASSED if passed else ControllerEvent.SELF_TEST_FAILED
+            )
         self._automatic.feel(self.motion, now)
         wish = self._automatic.wish(self.state, self.motion, self.switch, now)
         if wish is not None:
             self._move(wish)
         at_rest = self._automatic.at_rest_for(now) >= machine.REST_TIME
         if self.state is _S.LAUNCHED and at_rest:
-            self._move(Event.AT_REST)
+            self._move(ControllerEvent.AT_REST)
         if self.state is _S.ARMED and self.switch(p.ENABLE_APS):
             accident = self._aps.accident(self.motion, now)
             if accident:
@@ -187,7 +189,7 @@ class UpfController(UpfNode):
 
     # -- states ----------------------------------------------------------------------------------
 
-    def _move(self, event: Event) -> None:
+    def _move(self, event: ControllerEvent) -> None:
         self._enter(after(machine.TRANSITIONS, self.state, event))
 
     def _enter(self, state: ParachuteState) -> None:
@@ -202,13 +204,13 @@ class UpfController(UpfNode):
         wanted = machine.ENTRY_REQUESTS.get(state)
         self._entry_call = 0 if wanted is None else self._ask_vehicle(wanted)
 
-    def _possible(self, event: Event) -> bool:
+    def _possible(self, event: ControllerEvent) -> bool:
         return (self.state, event) in machine.TRANSITIONS
 
     def _set_errors(self, errors: set[str]) -> None:
         self.errors = errors
         self.send_soon(names.PARACHUTE_STATUS)
-        event = Event.FAULT if errors else Event.FAULT_CLEARED
+        event = ControllerEvent.FAULT if errors else ControllerEvent.FAULT_CLEARED
         if self._possible(event):
             self._move(event)
 
@@ -264,10 +266,10 @@ class UpfController(UpfNode):
         self._peers.triggers[source] = self.now
         name = self.definitions.state_name(names.TRIGGER_STATUS, values)
         fired = bool(values.get("is_launched")) or name == "LAUNCHED"
-        if fired and self._possible(Event.TRIGGER_FIRED):
-            self._move(Event.TRIGGER_FIRED)
+        if fired and self._possible(ControllerEvent.TRIGGER_FIRED):
+            self._move(ControllerEvent.TRIGGER_FIRED)
 
-    def _parachute_service(self, request: Heard) -> dict[str, Any]:
+    def _parachute_service(self, request: ReceivedTransfer) -> dict[str, Any]:
         service = names.PARACHUTE_SERVICE
         if not self.definitions.magic_is_good(service, request.values):
             return self.definitions.result(service, "BAD_MAGIC_NUMBER")
@@ -281,7 +283,7 @@ class UpfController(UpfNode):
         if switch is not None:
             if self.switch(switch):
                 return "REJECTED"
-            event = Event[name.removeprefix("TYPE_")]
+            event = ControllerEvent[name.removeprefix("TYPE_")]
             if self.state is _ASKED_FOR[event]:
                 # Asked once more, because the first answer was lost.
                 return "SUCCESS"

@@ -22,8 +22,8 @@ from chute_ros.links.upf.simulator.memory import ParameterMemory
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.calls import CallLimits, ServiceCalls
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.sim.acting import Actor
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
@@ -66,7 +66,7 @@ class UpfNode(Actor):
         #: Message type -> what it does with (source, values).
         self.messages: dict[str, Callable[[int, Mapping[str, Any]], None]] = {}
         #: Service type -> what it answers to a request.
-        self.services: dict[str, Callable[[Heard], dict[str, Any] | None]] = {
+        self.services: dict[str, Callable[[ReceivedTransfer], dict[str, Any] | None]] = {
             bus_requests.GET_NODE_INFO: self._get_node_info,
             bus_requests.GET_SET: self._get_set,
             bus_requests.EXECUTE_OPCODE: self._execute_opcode,
@@ -119,10 +119,10 @@ class UpfNode(Actor):
         heard = self.endpoint.receive(data, now)
         if heard is None:
             return
-        if heard.kind is Kind.RESPONSE:
+        if heard.kind is TransferKind.RESPONSE:
             transfer_id = heard.transfer_id
             self.calls.response(heard.source, heard.name, transfer_id, heard.values, now)
-        elif heard.kind is Kind.REQUEST:
+        elif heard.kind is TransferKind.REQUEST:
             self._serve(heard)
         elif heard.name == ALLOCATION:
             self._dna.heard(heard.source, heard.values, now)
@@ -235,7 +235,7 @@ class UpfNode(Actor):
 
     # -- services -------------------------------------------------------------------------------
 
-    def _serve(self, request: Heard) -> None:
+    def _serve(self, request: ReceivedTransfer) -> None:
         if self.mute or not self.node_id:
             return
         handler = self.services.get(request.name)
@@ -253,7 +253,7 @@ class UpfNode(Actor):
         uptime = int(self.now - self.booted_at)
         return {"uptime_sec": uptime, "health": self.health, "mode": int(self.initializing)}
 
-    def _get_node_info(self, request: Heard) -> dict[str, Any]:
+    def _get_node_info(self, request: ReceivedTransfer) -> dict[str, Any]:
         return {
             "status": self._node_status(),
             "software_version": {"major": 3, "minor": 0},
@@ -261,17 +261,17 @@ class UpfNode(Actor):
             "name": self.settings.name.encode(),
         }
 
-    def _transport_stats(self, request: Heard) -> dict[str, Any]:
+    def _transport_stats(self, request: ReceivedTransfer) -> dict[str, Any]:
         return {
             "transfers_tx": self.endpoint.sent_count,
             "transfers_rx": self.endpoint.received_count,
             "transfer_errors": sum(self.endpoint.counts.values()),
         }
 
-    def _restart_node(self, request: Heard) -> dict[str, Any]:
+    def _restart_node(self, request: ReceivedTransfer) -> dict[str, Any]:
         return {"ok": request.values["magic_number"] == bus_requests.RESTART_MAGIC}
 
-    def _get_set(self, request: Heard) -> dict[str, Any]:
+    def _get_set(self, request: ReceivedTransfer) -> dict[str, Any]:
         name = self.memory.name_of(request.values)
         wanted = p.value_of(request.values["value"])
         if name and wanted is not None and self.memory.set(name, wanted):
@@ -279,7 +279,7 @@ class UpfNode(Actor):
             self.parameter_changed(name)
         return self.memory.answer(name)
 
-    def _execute_opcode(self, request: Heard) -> dict[str, Any]:
+    def _execute_opcode(self, request: ReceivedTransfer) -> dict[str, Any]:
         before = dict(self.values)
         done = self.memory.execute(request.values["opcode"])
         for name, value in self.values.items():

@@ -7,7 +7,14 @@ from itertools import pairwise
 
 from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.transfer import END, START, TOGGLE, Kind, frames_of, head_of
+from chute_ros.protocol.dronecan.transfer import (
+    END,
+    START,
+    TOGGLE,
+    TransferKind,
+    frames_of,
+    head_of,
+)
 
 #: The names of the clauses.
 WIRE_BREAKS = (
@@ -32,10 +39,10 @@ class SpoiltRequests:
         if frame is None or not frame.extended or not frame.data:
             return "foreign-frames"
         head = head_of(frame)
-        if head.kind is Kind.MESSAGE:
+        if head.kind is TransferKind.MESSAGE:
             known = self._types.by_id(head.type_id, head.kind.value)
             return "" if known else "foreign-frames"
-        to_it = head.kind is Kind.REQUEST and head.destination == node
+        to_it = head.kind is TransferKind.REQUEST and head.destination == node
         return self._follow(frame, frame.data[-1]) if to_it else ""
 
     def mended(self) -> list[CanFrame]:

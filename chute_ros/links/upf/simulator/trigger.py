@@ -15,7 +15,7 @@ from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.errors import error_places, told_errors
 from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
-from chute_ros.protocol.dronecan.endpoint import Heard
+from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 
 STATUS_INTERVAL = 0.1  # s
 
@@ -86,7 +86,7 @@ class UpfTrigger(UpfNode):
         self.errors = errors
         self.send_soon(names.TRIGGER_STATUS)
 
-    def _trigger_service(self, request: Heard) -> dict[str, Any]:
+    def _trigger_service(self, request: ReceivedTransfer) -> dict[str, Any]:
         service = names.TRIGGER_SERVICE
         if not self.definitions.magic_is_good(service, request.values):
             return self.definitions.result(service, "BAD_MAGIC_NUMBER")

@@ -11,15 +11,15 @@ from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.commands import (
     Acknowledgement,
-    Command,
     CommandLimits,
     CommandTransactions,
+    MavCommand,
 )
 from chute_ros.links.mavlink.protocol.unanswered import MOST_SENDS
 
-RELEASE = Command(1, 161, 208, (2.0, *[0.0] * 6))
-DISABLE = Command(1, 161, 208, (0.0,) * 7)
-ARM = Command(1, 161, 225, (4.0, 4.0, *[0.0] * 5))
+RELEASE = MavCommand(1, 161, 208, (2.0, *[0.0] * 6))
+DISABLE = MavCommand(1, 161, 208, (0.0,) * 7)
+ARM = MavCommand(1, 161, 225, (4.0, 4.0, *[0.0] * 5))
 
 
 class Bench:
@@ -149,7 +149,7 @@ def test_a_late_answer_to_an_earlier_command_does_not_confirm_a_later_one():
 
 
 def test_commands_of_other_numbers_and_components_are_under_way_at_once():
-    other = Command(1, 162, 208)
+    other = MavCommand(1, 162, 208)
     bench = Bench().start(1, RELEASE).start(2, ARM).start(3, other).at(0.1)
     assert len(bench.sent) == 3
     bench.ack(ARM, results.DENIED).ack(other).ack(RELEASE)

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.links.mavlink.protocol import results
-from chute_ros.links.mavlink.protocol.commands import Command, CommandFinished
+from chute_ros.links.mavlink.protocol.commands import CommandFinished, MavCommand
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import ConfirmedCommand, EffectLimits, EffectLoop
 from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
 from chute_ros.transitions import after
 
-ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
-ASK = Command(1, 161, 512, (430.0, *[0.0] * 6))
+ORDER = MavCommand(1, 161, 208, (2.0, *[0.0] * 6))
+ASK = MavCommand(1, 161, 512, (430.0, *[0.0] * 6))
 
 
 class Bench:

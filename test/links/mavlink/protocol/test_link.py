@@ -484,7 +484,7 @@ class Line:
     def reasons(self):
         summary = self.runtime.summarise(self.link, self.t)
         reasons = (*summary.reasons, *self.link.vehicle_state(self.t).faults)
-        return [one for one in reasons if "does not hear us" in one]
+        return [one for one in reasons if "receives nothing from us" in one]
 
 
 @pytest.mark.parametrize("kind", [PX4, ARDUCOPTER])
@@ -494,7 +494,9 @@ def test_an_autopilot_that_hears_nothing_of_ours_forbids_take_off(kind):
     assert line.run(9.0) == set()
     line.run(3.0)
     (reason,) = line.reasons()
-    assert reason.startswith("autopilot 1/1 does not hear us: no answer to any command, TIMESYNC")
+    assert reason.startswith(
+        "autopilot 1/1 receives nothing from us: no answer to any command, TIMESYNC"
+    )
     assert "check our TX line" in reason
     # The first answer ends it; a line that dies later is found as well.
     line.to[line.autopilot] = 0.0
@@ -517,7 +519,9 @@ def test_a_parachute_that_hears_nothing_of_ours_forbids_take_off_and_nothing_in_
     assert line.run(10.0) == set()
     line.run(3.5)
     (reason,) = line.reasons()
-    assert reason.startswith("parachute 1/161 does not hear us: no answer to any command for ")
+    assert reason.startswith(
+        "parachute 1/161 receives nothing from us: no answer to any command for "
+    )
     assert not line.runtime.summarise(line.link, line.t).device_healthy
     line.autopilot.model.armed = True
     line.run(1.5)

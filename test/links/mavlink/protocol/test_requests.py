@@ -9,18 +9,22 @@ from link_bench import Bench, heartbeat
 from link_bench import ack as ack_message
 
 from chute_ros.links.mavlink.protocol import results
-from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
+from chute_ros.links.mavlink.protocol.commands import (
+    Acknowledgement,
+    CommandTransactions,
+    MavCommand,
+)
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.goals import Watch
+from chute_ros.links.mavlink.protocol.goals import MessageWatch
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import ConfirmedCommand
 from chute_ros.protocol.events import RequestFinished, RequestReport
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.requests import Requests
 
-ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
-SET = Command(1, 161, 511, (430.0, 500000.0, *[0.0] * 5))
-ASK = Command(1, 161, 512, (244.0, 430.0, *[0.0] * 5))
+ORDER = MavCommand(1, 161, 208, (2.0, *[0.0] * 6))
+SET = MavCommand(1, 161, 511, (430.0, 500000.0, *[0.0] * 5))
+ASK = MavCommand(1, 161, 512, (244.0, 430.0, *[0.0] * 5))
 
 
 def fresh():
@@ -66,7 +70,7 @@ def test_a_refused_request_reports_and_ends_without_anything_sent():
 
 def interval(requests):
     message = d.MAVLINK_MSG_ID_MESSAGE_INTERVAL
-    watch = Watch(1, 161, message, "message_id", 430)
+    watch = MessageWatch(1, 161, message, "message_id", 430)
     read_back = (goal("read", ASK, shown=watch.seen), watch)
     requests.begin(5, goal("set", SET), 0.0, follow_up=read_back)
     requests.drive(0.0)
@@ -123,7 +127,7 @@ def test_two_callers_of_the_same_urgent_goal_are_both_answered():
 GOALS = st.builds(
     goal,
     st.sampled_from(["release", "disable", "ask"]),
-    st.sampled_from([ORDER, SET, ASK, Command(1, 162, 208)]),
+    st.sampled_from([ORDER, SET, ASK, MavCommand(1, 162, 208)]),
     insist=st.booleans(),
     urgent=st.booleans(),
     hinders_release=st.booleans(),
@@ -170,7 +174,7 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
 
 
 def test_what_prepares_a_goal_leaves_right_before_it_and_its_answer_ends_nothing():
-    requests, prepare = fresh(), Command(1, 161, 225)
+    requests, prepare = fresh(), MavCommand(1, 161, 225)
     requests.begin(5, ConfirmedCommand("release", (prepare, ORDER), "shown", urgent=True), 0.0)
     requests.drive(0.0)
     ack(requests, prepare, 0.1, results.DENIED)
@@ -181,7 +185,7 @@ def test_what_prepares_a_goal_leaves_right_before_it_and_its_answer_ends_nothing
 
 
 def test_goals_side_by_side_end_together_and_one_that_fails_is_named_first():
-    requests, other = fresh(), Command(1, 162, 208)
+    requests, other = fresh(), MavCommand(1, 162, 208)
     requests.begin_all(5, {"a": goal(), "b": goal(command=other)}, 0.0)
     assert [send.command for send in requests.drive(0.0)] == [ORDER, other]
     ack(requests, ORDER, 0.1)
@@ -196,7 +200,7 @@ def test_goals_side_by_side_end_together_and_one_that_fails_is_named_first():
 
 
 def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
-    requests, prepare = fresh(), Command(1, 161, 225)
+    requests, prepare = fresh(), MavCommand(1, 161, 225)
     requests.begin(5, ConfirmedCommand("release", (prepare, ORDER), "shown"), 0.0)
     assert [send.command for send in requests.drive(0.0)] == [prepare, ORDER]
     ack(requests, ORDER, 0.1)
@@ -208,7 +212,7 @@ def test_a_request_that_is_abandoned_while_it_waits_for_its_turn_is_never_sent()
     requests = fresh()
     requests.begin(5, goal("first", ORDER), 0.0)
     requests.drive(0.0)
-    requests.begin(6, goal("second", Command(1, 161, 208)), 0.1)
+    requests.begin(6, goal("second", MavCommand(1, 161, 208)), 0.1)
     requests.abandon(6, "not wanted", 0.1)
     assert requests.drive(0.1) == []
     assert ack(requests, ORDER, 0.2) == []

@@ -22,7 +22,7 @@ from umbilical_rocket import (
     vehicle,
 )
 
-from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
+from chute_ros.links.umbilical.protocol.flight_computer import FlightComputerTracker
 from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.links.umbilical.protocol.layouts import Layout, Record
 from chute_ros.links.umbilical.protocol.modes import FlightMode
@@ -373,14 +373,14 @@ def test_without_a_pressure_nobody_knows_its_height_after_a_restart():
 def test_any_layout_serves_also_one_with_hardly_a_field():
     for layout in BY_NAME.values():
         values = layout.decode(body(layout, flight_mode="1", ssa_drogue_deployed="0"))
-        computer = FlightComputer(LIMITS)
+        computer = FlightComputerTracker(LIMITS)
         computer.heard(Record(layout, values, 0.0), 0.0)
         assert computer.record.number("altitude") == 12.5, layout.name
         assert computer.status(0.0, "").deployed, layout.name
     reference = BY_NAME["telem57_airbrake_state"]
     needed = ("flight_mode", "altitude", "sv_open", "mav_open", *FLAGS, "ms_since_boot_cfc")
     small = Layout("small", tuple(f for f in reference.fields if f.name in needed), 2, ())
-    computer = FlightComputer(LIMITS)
+    computer = FlightComputerTracker(LIMITS)
     computer.heard(Record(small, small.decode("1,25,0,0,0,0,99"), 0.0), 0.0)
     seen = computer.vehicle_state(0.0)
     assert (seen.height, seen.armed, seen.landed_state) == (0.0, Armed.ARMED, _GROUND)
@@ -414,7 +414,7 @@ def seen(computer, now):
 @given(st.lists(st.tuples(RECORDS | st.none(), st.floats(0, 20)), max_size=20))
 def test_the_picture_changes_by_a_record_or_at_a_deadline_and_never_between(story):
     """Each step: a record (None: only a sign of life), and the time until the next."""
-    computer, now = FlightComputer(LIMITS), 0.0
+    computer, now = FlightComputerTracker(LIMITS), 0.0
     for texts, pause in story:
         if texts is None:
             computer.alive(now)

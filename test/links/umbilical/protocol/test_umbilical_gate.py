@@ -19,7 +19,7 @@ from umbilical_link_bench import (
 
 from chute_ros.errors import TransitionError
 from chute_ros.links.umbilical.protocol import commands
-from chute_ros.links.umbilical.protocol.gate import TABLE, Situation, Verdict, rule
+from chute_ros.links.umbilical.protocol.gate import TABLE, CommandVerdict, Situation, rule
 from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 
 #: Columns: Startup, Standby, Ascent, Coast, DrogueDeployed, MainDeployed, Fault, lost in flight,
@@ -80,7 +80,7 @@ def test_the_table_says_what_is_typed_here_and_nothing_else():
                 assert name in ruling.refusal, told
                 assert situation.value in ruling.refusal, told
             elif LETTERS[name, situation] == "f" and name != "launch":
-                assert rule(name, situation, False).verdict is Verdict.FORCE, told
+                assert rule(name, situation, False).verdict is CommandVerdict.FORCE, told
 
 
 def test_a_pair_that_is_not_listed_raises():
@@ -95,7 +95,7 @@ def test_a_pair_that_is_not_listed_raises():
 
 def test_a_refusal_says_why_and_what_would_help():
     launch = rule("launch", Situation.STANDBY, False)
-    assert launch.verdict is Verdict.CONFIRM
+    assert launch.verdict is CommandVerdict.CONFIRM
     assert launch.refusal == (
         "launch (flight mode Standby) needs an explicit confirmation: set force"
     )

@@ -11,7 +11,7 @@ from chute_ros.links.umbilical.protocol.config import HeartbeatInFlight, Umbilic
 from chute_ros.links.umbilical.protocol.layouts import layout_from
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode, FlightComputerSettings
 
 START = 1000.0
 
@@ -57,20 +57,20 @@ class Flight:
 
 def test_by_default_the_flight_goes_on_to_the_main():
     flight = Flight(HeartbeatInFlight.AUTO).launched()
-    flight.until(lambda: flight.computer.mode in (Mode.MainDeployed, Mode.Fault))
+    flight.until(lambda: flight.computer.mode in (ComputerMode.MainDeployed, ComputerMode.Fault))
     assert flight.modes[-5:] == [
-        Mode.Standby,
-        Mode.Ascent,
-        Mode.Coast,
-        Mode.DrogueDeployed,
-        Mode.MainDeployed,
+        ComputerMode.Standby,
+        ComputerMode.Ascent,
+        ComputerMode.Coast,
+        ComputerMode.DrogueDeployed,
+        ComputerMode.MainDeployed,
     ]
 
 
 def test_with_heartbeats_in_flight_such_a_firmware_goes_to_fault():
     flight = Flight(HeartbeatInFlight.YES).launched()
-    flight.until(lambda: flight.computer.mode in (Mode.Coast, Mode.Fault))
-    assert flight.computer.mode is Mode.Fault
+    flight.until(lambda: flight.computer.mode in (ComputerMode.Coast, ComputerMode.Fault))
+    assert flight.computer.mode is ComputerMode.Fault
 
 
 def beats(story, begin, end):
@@ -114,8 +114,10 @@ def test_the_parameter_wins_over_the_layout_and_the_layout_is_asked_by_auto():
     }
     assert not layout_from(content, "here").heartbeat_in_flight
     own = layout_from({**content, "heartbeat_in_flight": True}, "here")
-    wants = {HeartbeatInFlight.AUTO: Mode.Fault, HeartbeatInFlight.NO: Mode.Coast}
+    wants = {HeartbeatInFlight.AUTO: ComputerMode.Fault, HeartbeatInFlight.NO: ComputerMode.Coast}
     for setting, ends in wants.items():
         flight = Flight(setting, layouts=[own]).launched()
-        flight.until(lambda flight=flight: flight.computer.mode in (Mode.Coast, Mode.Fault))
+        flight.until(
+            lambda flight=flight: flight.computer.mode in (ComputerMode.Coast, ComputerMode.Fault)
+        )
         assert flight.computer.mode is ends

@@ -7,8 +7,13 @@ from umbilical_link_bench import ASCENT, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.links.umbilical.protocol.config import MemoryLimits
-from chute_ros.links.umbilical.protocol.events import DumpData, DumpFinished, DumpStarted, Progress
-from chute_ros.links.umbilical.protocol.memory import STEPS, Sign, Step
+from chute_ros.links.umbilical.protocol.events import (
+    DumpData,
+    DumpFinished,
+    DumpStarted,
+    WorkProgress,
+)
+from chute_ros.links.umbilical.protocol.memory import STEPS, WorkEvent, WorkStep
 from chute_ros.transitions import after
 
 CSV = b"time,mode\n1,2\n3,4\n"
@@ -45,13 +50,13 @@ def failed(bench, number, text):
 
 
 def test_a_step_is_in_the_table_or_raises():
-    for step, sign in itertools.product(Step, Sign):
-        if (step, sign) == (Step.SENT, Sign.TOKEN_SENT):
+    for step, sign in itertools.product(WorkStep, WorkEvent):
+        if (step, sign) == (WorkStep.SENT, WorkEvent.TOKEN_SENT):
             with pytest.raises(TransitionError, match="its token was sent"):
                 after(STEPS, step, sign)
         else:
-            began = sign is Sign.FIRST_SIGN or step is Step.BEGUN
-            wanted = Step.BEGUN if began else Step.SENT
+            began = sign is WorkEvent.FIRST_SIGN or step is WorkStep.BEGUN
+            wanted = WorkStep.BEGUN if began else WorkStep.SENT
             assert after(STEPS, step, sign) is STEPS[step, sign] is wanted, (step, sign)
 
 
@@ -80,7 +85,7 @@ def test_a_long_dump_tells_how_far_it_is():
         bench.after(0.5).hear_bytes(b"1,2,3,4,\n" * 15_000)
     bench.hear(END["csv"])
     # What may be the beginning of an end mark or of telemetry is counted when it is known.
-    told = [event.done for event in bench.of(Progress)]
+    told = [event.done for event in bench.of(WorkProgress)]
     assert told == [pytest.approx(size, abs=10) for size in (270_000, 540_000, 810_000)]
     assert bench.end(number).message == "dump flash complete, 810000 bytes"
 
@@ -192,7 +197,7 @@ def test_a_wipe_tells_its_progress_and_its_end():
     bench.hear("Wipe progress: 2048/2048 sectors").after(1.0)
     assert bench.ends(number) == []
     bench.hear("Flash wiped successfully.")
-    assert [(e.done, e.total) for e in bench.of(Progress)] == [(100, 2048), (2048, 2048)]
+    assert [(e.done, e.total) for e in bench.of(WorkProgress)] == [(100, 2048), (2048, 2048)]
     assert bench.end(number).message == "wipe flash complete: Flash wiped successfully."
     assert bench.steps(number) == ["SENT", "CONFIRMED"]
     assert bench.tokens == ["<W>"]

@@ -2,7 +2,7 @@
 
 from umbilical_lines import record
 
-from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
+from chute_ros.links.umbilical.protocol.flight_computer import FlightComputerTracker
 from chute_ros.protocol.liveness import LivenessLimits
 
 STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
@@ -14,7 +14,7 @@ class Rocket:
     """A flight computer that started 100 s before time 0."""
 
     def __init__(self, main_counts=False):
-        self.computer = FlightComputer(LIMITS, main_counts)
+        self.computer = FlightComputerTracker(LIMITS, main_counts)
         self.started = -100.0
 
     def says(self, at, mode, **texts):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_flight_computer import LAYOUTS, Host
 
-from chute_ros.links.umbilical.simulator.settings import Mode
+from chute_ros.links.umbilical.simulator.settings import ComputerMode
 from chute_ros.links.umbilical.simulator.telemetry import rust_text, telem_body, telem_line
 
 
@@ -94,7 +94,7 @@ def test_a_line_of_every_layout_decodes_to_what_was_given(name):
 
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_the_device_fills_every_layout_in_every_mode(name):
-    for mode in Mode:
+    for mode in ComputerMode:
         host = Host(name)
         host.act(f"jump={mode.name}")
         host.run(0.3)

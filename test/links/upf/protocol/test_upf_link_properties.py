@@ -23,7 +23,7 @@ from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
-from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import Transfer, TransferKind, frames_of
 from chute_ros.protocol.events import RequestFinished
 
 LAYOUT = st.sampled_from(sorted(LAYOUTS))
@@ -76,7 +76,11 @@ def transfers(draw, layout):
     types = layout.types
     name = draw(st.sampled_from(NAMES))
     service = types.find(name, "request") is not None
-    kind = draw(st.sampled_from([Kind.REQUEST, Kind.RESPONSE])) if service else Kind.MESSAGE
+    kind = (
+        draw(st.sampled_from([TransferKind.REQUEST, TransferKind.RESPONSE]))
+        if service
+        else TransferKind.MESSAGE
+    )
     data_type = types.find(name, kind.value)
     payload = draw(st.binary(max_size=40))
     if draw(st.booleans()):

@@ -6,29 +6,29 @@ import pytest
 
 from chute_ros.errors import TransitionError
 from chute_ros.links.upf.protocol import machine
-from chute_ros.links.upf.protocol.machine import Event
+from chute_ros.links.upf.protocol.machine import ControllerEvent
 from chute_ros.model import ParachuteState as S
 from chute_ros.transitions import after
 
 NAMED = [state for state in S if state is not S.UNKNOWN]
-RESTARTS = {(state, Event.RESTART): S.NOT_READY for state in NAMED}
+RESTARTS = {(state, ControllerEvent.RESTART): S.NOT_READY for state in NAMED}
 WANTED = {
-    (S.NOT_READY, Event.SELF_TEST_PASSED): S.READY,
-    (S.NOT_READY, Event.SELF_TEST_FAILED): S.ABNORMAL,
-    (S.NOT_READY, Event.TRIGGER_FIRED): S.LAUNCHED,
-    (S.READY, Event.TAKEOFF): S.TAKEOFF,
-    (S.READY, Event.TRIGGER_FIRED): S.LAUNCHED,
-    (S.READY, Event.FAULT): S.ABNORMAL,
-    (S.TAKEOFF, Event.ARM): S.ARMED,
-    (S.TAKEOFF, Event.LAND): S.READY,
-    (S.TAKEOFF, Event.TRIGGER_FIRED): S.LAUNCHED,
-    (S.TAKEOFF, Event.FAULT): S.ABNORMAL,
-    (S.ARMED, Event.DISARM): S.TAKEOFF,
-    (S.ARMED, Event.TRIGGER_FIRED): S.LAUNCHED,
-    (S.ARMED, Event.FAULT): S.ABNORMAL,
-    (S.LAUNCHED, Event.AT_REST): S.TOUCHDOWN,
-    (S.ABNORMAL, Event.FAULT_CLEARED): S.READY,
-    (S.ABNORMAL, Event.TRIGGER_FIRED): S.LAUNCHED,
+    (S.NOT_READY, ControllerEvent.SELF_TEST_PASSED): S.READY,
+    (S.NOT_READY, ControllerEvent.SELF_TEST_FAILED): S.ABNORMAL,
+    (S.NOT_READY, ControllerEvent.TRIGGER_FIRED): S.LAUNCHED,
+    (S.READY, ControllerEvent.TAKEOFF): S.TAKEOFF,
+    (S.READY, ControllerEvent.TRIGGER_FIRED): S.LAUNCHED,
+    (S.READY, ControllerEvent.FAULT): S.ABNORMAL,
+    (S.TAKEOFF, ControllerEvent.ARM): S.ARMED,
+    (S.TAKEOFF, ControllerEvent.LAND): S.READY,
+    (S.TAKEOFF, ControllerEvent.TRIGGER_FIRED): S.LAUNCHED,
+    (S.TAKEOFF, ControllerEvent.FAULT): S.ABNORMAL,
+    (S.ARMED, ControllerEvent.DISARM): S.TAKEOFF,
+    (S.ARMED, ControllerEvent.TRIGGER_FIRED): S.LAUNCHED,
+    (S.ARMED, ControllerEvent.FAULT): S.ABNORMAL,
+    (S.LAUNCHED, ControllerEvent.AT_REST): S.TOUCHDOWN,
+    (S.ABNORMAL, ControllerEvent.FAULT_CLEARED): S.READY,
+    (S.ABNORMAL, ControllerEvent.TRIGGER_FIRED): S.LAUNCHED,
     **RESTARTS,
 }
 #: After the parachute is out only a restart leads back.
@@ -46,7 +46,7 @@ def test_states_are_numbered_as_in_the_document():
 
 
 def test_pair_of_state_and_stimulus_moves_or_raises():
-    for state, event in itertools.product(S, Event):
+    for state, event in itertools.product(S, ControllerEvent):
         if (state, event) in WANTED:
             moved = after(machine.TRANSITIONS, state, event)
             assert moved is WANTED[state, event], (state, event)

@@ -28,15 +28,15 @@ from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.endpoint import Endpoint, ReceivedTransfer
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.protocol.events import (
-    Ask,
     AskSupervisor,
     Notice,
     ParachuteChanged,
     RequestFinished,
     RequestReport,
+    SafetyAsk,
 )
 
 START = 1000.0
@@ -123,7 +123,7 @@ class Bench:
         self.events: list[Any] = []
         self.said: list[str] = []
         #: What the link sent, as its receivers understand it.
-        self.heard: list[tuple[float, Heard]] = []
+        self.heard: list[tuple[float, ReceivedTransfer]] = []
         #: Whether a frame is lost on its way: (from the link, its bytes).
         self.loses: Callable[[bool, bytes], bool] = lambda from_link, data: False
         #: The supervisor grants what it is asked for.
@@ -286,7 +286,9 @@ class Bench:
 
     def requests(self, name, type_name=""):
         """What the link asked by this service."""
-        asked = [one for _, one in self.heard if one.name == name and one.kind is Kind.REQUEST]
+        asked = [
+            one for _, one in self.heard if one.name == name and one.kind is TransferKind.REQUEST
+        ]
         if not type_name:
             return asked
         return [one for one in asked if self.definitions.type_name(name, one.values) == type_name]
@@ -294,7 +296,7 @@ class Bench:
     def answers(self):
         """What the link answered to VehicleService, as results without their prefix."""
         service = names.VEHICLE_SERVICE
-        responses = [one for _, one in self.heard if one.kind is Kind.RESPONSE]
+        responses = [one for _, one in self.heard if one.kind is TransferKind.RESPONSE]
         flyfire = [one for one in responses if one.name == service]
         return [self.definitions.result_name(service, one.values) for one in flyfire]
 
@@ -347,7 +349,7 @@ class Bench:
         first = min(self._ears)
         for node_id, ear in self._ears.items():
             one = ear.receive(data, self.now)
-            if one is not None and (one.kind is not Kind.MESSAGE or node_id == first):
+            if one is not None and (one.kind is not TransferKind.MESSAGE or node_id == first):
                 self.heard.append((self.t, one))
 
     def _collect(self):
@@ -364,10 +366,10 @@ class Bench:
     def _supervise(self, event):
         if not self.supervised:
             return
-        if event.ask is Ask.KILL:
+        if event.ask is SafetyAsk.KILL:
             self.link.kill_confirmed(self.now)
             return
-        if event.ask is Ask.FLIGHT_BLOCK:
+        if event.ask is SafetyAsk.FLIGHT_BLOCK:
             self.standing.add(event.device)
         else:
             self.standing.discard(event.device)

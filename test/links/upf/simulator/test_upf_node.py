@@ -13,7 +13,7 @@ from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.can_frame import pack
-from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import Transfer, TransferKind, frames_of
 
 SWITCHES = [one.name for one in p.PARAMETERS if one.kind is bool]
 NUMBERS = [one.name for one in p.PARAMETERS if one.kind is int]
@@ -333,13 +333,19 @@ def test_without_a_master_it_does_not_know_the_time():
 
 
 KNOWN = [
-    *((Kind.MESSAGE, name) for name in (names.VEHICLE_STATUS, names.TRIGGER_STATUS)),
-    *((Kind.MESSAGE, name) for name in (names.TRIGGER_LAUNCH, time_sync.MESSAGE)),
-    *((Kind.REQUEST, name) for name in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE)),
-    *((Kind.REQUEST, name) for name in (bus_requests.GET_SET, bus_requests.EXECUTE_OPCODE)),
-    *((Kind.REQUEST, name) for name in (bus_requests.RESTART_NODE, bus_requests.GET_NODE_INFO)),
-    (Kind.RESPONSE, names.VEHICLE_SERVICE),
-    (Kind.MESSAGE, "uavcan.protocol.dynamic_node_id.Allocation"),
+    *((TransferKind.MESSAGE, name) for name in (names.VEHICLE_STATUS, names.TRIGGER_STATUS)),
+    *((TransferKind.MESSAGE, name) for name in (names.TRIGGER_LAUNCH, time_sync.MESSAGE)),
+    *((TransferKind.REQUEST, name) for name in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE)),
+    *(
+        (TransferKind.REQUEST, name)
+        for name in (bus_requests.GET_SET, bus_requests.EXECUTE_OPCODE)
+    ),
+    *(
+        (TransferKind.REQUEST, name)
+        for name in (bus_requests.RESTART_NODE, bus_requests.GET_NODE_INFO)
+    ),
+    (TransferKind.RESPONSE, names.VEHICLE_SERVICE),
+    (TransferKind.MESSAGE, "uavcan.protocol.dynamic_node_id.Allocation"),
 ]
 TRANSFERS = st.tuples(
     st.sampled_from(KNOWN),
@@ -358,7 +364,7 @@ def test_whatever_comes_it_goes_on(transfers, dynamic):
     types = story.definitions.types
     for (kind, name), source, server, number, payload in transfers:
         data_type = types.find(name, kind.value)
-        to = 0 if kind is Kind.MESSAGE else server
+        to = 0 if kind is TransferKind.MESSAGE else server
         transfer = Transfer(kind, data_type.id, source, to, number, payload)
         for frame in frames_of(transfer, data_type.base_crc):
             story.bus.receive(pack(frame), story.now)

@@ -22,7 +22,7 @@ from chute_ros.links.upf.simulator.node import NodeSettings
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import TransferKind
 from chute_ros.sim.flight import FlightModel
 from chute_ros.sim.motion import Motion
 from chute_ros.transport.data_types import load_data_types
@@ -79,9 +79,9 @@ class Vehicle:
         assert not wrong, "a device sends nothing but whole transfers"
         if heard is None:
             return
-        if heard.kind is Kind.RESPONSE:
+        if heard.kind is TransferKind.RESPONSE:
             self.answers[heard.name, heard.transfer_id] = heard.values
-        elif heard.kind is Kind.REQUEST:
+        elif heard.kind is TransferKind.REQUEST:
             self._serve(heard, now)
         else:
             message = Message(now, heard.source, heard.values)
