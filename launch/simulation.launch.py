@@ -68,6 +68,7 @@ def _vehicle(context: LaunchContext) -> list:
                 "namespace": namespace,
                 "range": "LOCALHOST",
                 "parachute": parachute,
+                "config": LaunchConfiguration("config").perform(context),
                 **{links()[one].argument.name: at for one, at in vehicle.connections().items()},
             }.items(),
         ),
@@ -115,8 +116,13 @@ def _arguments() -> list:
         DeclareLaunchArgument(
             "parachute",
             default_value="mavlink",
-            choices=list(vehicles()),
+            choices=list(checked("simulation.launch.py", vehicles)),
             description="kind of parachute",
+        ),
+        DeclareLaunchArgument(
+            "config",
+            default_value="",
+            description="parameter file of all nodes; empty: as of vehicle.launch.py",
         ),
         DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
         DeclareLaunchArgument(

@@ -6,21 +6,23 @@ ros2 launch chute_ros vehicle.launch.py namespace:=rocket parachute:=umbilical
 """
 
 import os
+import sys
 from pathlib import Path
 
-from ament_index_python.packages import get_package_share_directory
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from chute_ros.links.api import SUPERVISOR
-from chute_ros.links.registered import links, vehicles
+from chute_ros.links.registered import links, package_of, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
 from chute_ros.tools.launch_checks import (
     check_arguments,
     check_connections,
     check_file,
     check_links,
+    check_vehicle,
     checked,
 )
 from launch import LaunchContext, LaunchDescription
@@ -31,11 +33,9 @@ LIVES_ON = {"respawn": True, "respawn_delay": 0.5}
 
 
 def _nodes(context: LaunchContext) -> list:
-    """The nodes with one parameter file; a connection that is given overrides the file's."""
-    share = get_package_share_directory("chute_ros")
+    """The nodes with one parameter file, or what the vehicle's link has registered where there is
+    none; a connection that is given overrides either."""
     parachute = LaunchConfiguration("parachute").perform(context)
-    config = LaunchConfiguration("config").perform(context)
-    config = config or share + f"/config/{parachute}_vehicle.yaml"
     namespace = LaunchConfiguration("namespace").perform(context)
     # An enclave has the name of its node, with the namespace.
     place = "/".join(["", *filter(None, namespace.split("/"))])
@@ -47,30 +47,57 @@ def _nodes(context: LaunchContext) -> list:
     checked("vehicle.launch.py", lambda: check_links(context, parachute, given))
     connections = {kind.name: given[kind.name] for kind in kinds if given[kind.name]}
     checked("vehicle.launch.py", lambda: check_connections(connections))
-    names = [*(kind.name for kind in kinds), SUPERVISOR]
-    checked("vehicle.launch.py", lambda: check_file(Path(config), place, names, connections))
+    config = LaunchConfiguration("config").perform(context) or _own_file(parachute)
+    parameters = checked(
+        "vehicle.launch.py", lambda: _parameters(parachute, config, place, connections)
+    )
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
-    started = [(kind.package, kind.name, [config]) for kind in kinds]
-    started.append(("chute_ros", SUPERVISOR, [config]))
+    started = [(kind.package, kind.name) for kind in kinds]
+    started.append(("chute_ros", SUPERVISOR))
     if LaunchConfiguration("deploy_action").perform(context) == "true":
-        # It has no parameters, and so no section in the file.
-        started.append(("chute_ros", "deploy_action", []))
+        # It has no parameters.
+        started.append(("chute_ros", "deploy_action"))
     return [
         Node(
             package=package,
             executable=name,
             namespace=namespace,
-            parameters=[*own_config, *_connection(connections.get(name))],
+            parameters=parameters.get(name, []),
             ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
             output="screen",
             **LIVES_ON,
         )
-        for package, name, own_config in started
+        for package, name in started
     ]
 
 
-def _connection(given: str | None) -> list[dict[str, str]]:
-    return [{"connection": given}] if given else []
+def _own_file(parachute: str) -> str:
+    """The parameter file that the package of this parachute has; empty: it has none."""
+    try:
+        share = get_package_share_directory(package_of(parachute))
+    except PackageNotFoundError:
+        return ""
+    file = Path(share, "config", f"{parachute}_vehicle.yaml")
+    return str(file) if file.is_file() else ""
+
+
+def _parameters(
+    parachute: str, config: str, place: str, connections: dict[str, str]
+) -> dict[str, list]:
+    """Node -> its parameters: of the file config; empty: as its link registers the vehicle."""
+    vehicle = vehicles()[parachute]
+    if not config:
+        given = check_vehicle(vehicle, connections)
+        print(
+            f"vehicle.launch.py: {package_of(parachute)} has no config/{parachute}_vehicle.yaml: "
+            f"parachute:={parachute} gets the parameters of its link's entry (or config:=FILE)",
+            file=sys.stderr,
+        )
+        return {name: [own] if own else [] for name, own in given.items()}
+    names = (*vehicle.links, SUPERVISOR)
+    check_file(Path(config), place, names, connections)
+    overrides = {name: [{"connection": given}] for name, given in connections.items()}
+    return {name: [config, *overrides.get(name, [])] for name in names}
 
 
 def _range() -> str:
@@ -102,13 +129,16 @@ def _arguments() -> list:
         DeclareLaunchArgument(
             "parachute",
             default_value="mavlink",
-            choices=list(vehicles()),
+            choices=list(checked("vehicle.launch.py", vehicles)),
             description="kind of parachute",
         ),
         DeclareLaunchArgument(
             "config",
             default_value="",
-            description="parameter file of all nodes; empty: the one of this parachute",
+            description=(
+                "parameter file of all nodes; empty: the one of this parachute, in the package "
+                "of its link"
+            ),
         ),
         *(
             DeclareLaunchArgument(

@@ -9,10 +9,14 @@ from collections.abc import Iterable, Mapping
 
 from chute_ros.campaign.scenario import part
 from chute_ros.links.api import SUPERVISOR, VehicleKind
-from chute_ros.links.registered import links, vehicles
+from chute_ros.links.registered import links
 from chute_ros.model import Action
 from chute_ros.protocol.vehicle_merge import AUTOPILOTS, IMU, ODOMETRY
 from safety_case.documents import ROOT
+
+#: Links of this repository, and the vehicles that they register. The case is of no others.
+LINKS = {name: kind for name, kind in links().items() if kind.package == "chute_ros"}
+VEHICLES = {one.name: one for kind in LINKS.values() for one in kind.vehicles}
 
 #: Section of fmea.sdoc -> nodes, devices and sources of the vehicle's state that it speaks of.
 #: A section without any is a part that the code has no list of. A link has one wire, which stands
@@ -53,7 +57,7 @@ ACTIONS: Mapping[str, tuple[str, ...]] = {
 
 def without_section() -> Iterable[str]:
     """What the code has and no section above speaks of, each in a line."""
-    for name in links():
+    for name in LINKS:
         if not any(section.startswith(f"{name}: ") for section in PARTS):
             yield f"the link {name} has no part in safety_case/parts.py"
     spoken = {name for names in PARTS.values() for name in names}
@@ -68,8 +72,8 @@ def without_section() -> Iterable[str]:
 def carried_by(section: str) -> list[str]:
     """The vehicles of config/ that have this part; all, if it is not one of a link."""
     link = section.partition(": ")[0]
-    all_vehicles = vehicles().values()
-    if link not in links():
+    all_vehicles = VEHICLES.values()
+    if link not in LINKS:
         return [vehicle.name for vehicle in all_vehicles]
     devices = {*PARTS[section]} & _devices()
     return [
@@ -80,12 +84,12 @@ def carried_by(section: str) -> list[str]:
 
 
 def _devices() -> set[str]:
-    return {device for vehicle in vehicles().values() for device in _devices_of(vehicle)}
+    return {device for vehicle in VEHICLES.values() for device in _devices_of(vehicle)}
 
 
 def _devices_of(vehicle: VehicleKind) -> set[str]:
     """Those that the campaign takes the power from."""
-    parts = (part(link) for link in vehicle.links if links()[link].part)
+    parts = (part(link) for link in vehicle.links if LINKS[link].part)
     return {device for one in parts for device in one.stopping(vehicle)}
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from chute_ros.links.registered import vehicles
 from safety_case.check import TOLD
 from safety_case.documents import Node, list_table, of_kind, plain, write_made
-from safety_case.parts import carried_by
+from safety_case.parts import VEHICLES, carried_by
 
 _INTRODUCTION = """
 Each single failure that, with the shipped settings, can lead to a missed or to a false deploy
@@ -41,7 +40,7 @@ def write(nodes: Sequence[Node]) -> None:
     for one in sorted(stay, key=lambda one: -len(carried_by(one["SECTION"]))):
         title = _FORGED if one["TITLE"] == "forged" else _TITLES[TOLD.index(one["TOLD"])]
         tables[title].append(one)
-    kinds = "\n".join(f"- {one.name}: {plain(one.description)}" for one in vehicles().values())
+    kinds = "\n".join(f"- {one.name}: {plain(one.description)}" for one in VEHICLES.values())
     counted = f"{len(stay)} of {len(failures)} failure modes stay."
     parts = [("", f"{_INTRODUCTION}\n{kinds}\n\n{counted}")]
     for title, rows in tables.items():
@@ -62,7 +61,7 @@ def _row(one: Node) -> tuple[str, ...]:
 
 def _wiring(section: str) -> str:
     names = carried_by(section)
-    return "all" if len(names) == len(vehicles()) else ", ".join(names)
+    return "all" if len(names) == len(VEHICLES) else ", ".join(names)
 
 
 def _line(text: str) -> str:

@@ -10,9 +10,12 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint, entry_points
 
 import pytest
 from hypothesis import settings
+
+from chute_ros.links import registered
 
 # The gate tries the same examples each time: what it says of a commit can be repeated. New ones
 # are looked for with HYPOTHESIS_PROFILE=search.
@@ -22,6 +25,16 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
 
 #: How long anything that must happen may take on a busy machine, s.
 PATIENCE = 20.0
+
+
+def _of_ours(group: str) -> list[EntryPoint]:
+    """The entries of this repository."""
+    return [one for one in entry_points(group=group) if one.value.startswith("chute_ros.")]
+
+
+# The tests are of our links and vehicles, and of flights drawn from these, whichever links are
+# installed beside them.
+pytest.MonkeyPatch().setattr(registered, "entry_points", _of_ours)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

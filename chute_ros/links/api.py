@@ -16,7 +16,9 @@ A link is how one kind of device is spoken to. Everything of it is in one folder
                     suite and the docs find all that
 
 and it is registered by one entry of the entry point group `chute_ros.links`, which any package may
-have: `NODE = PACKAGE.MODULE:LINK` (docs/design/links.md).
+have: `NODE = PACKAGE.MODULE:LINK` (docs/design/links.md). Its node, vehicles, launch argument and
+device have names that no other link has, nor a launch file of ours: else nothing starts
+(NotRegisteredError).
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from chute_ros.errors import NotBuiltError, NotRegisteredError
 from chute_ros.settings import Value
 
 #: The node that speaks to the autopilot, also where the parachute is on another link.
@@ -88,7 +91,8 @@ class CampaignPart(Protocol):
 
 @dataclass(frozen=True)
 class ConnectionArgument:
-    """An argument of vehicle.launch.py that overrides the parameter `connection` of a link."""
+    """An argument of vehicle.launch.py that overrides the parameter `connection` of a link. No
+    other link has it, nor vehicle.launch.py or simulation.launch.py itself."""
 
     name: str
     description: str
@@ -110,10 +114,11 @@ class Sockets:
 class VehicleKind:
     """A vehicle that the launch files, config/ and the campaign know by its name.
 
-    links: its device nodes, in the order in which they are started. parameters: node -> what
-    differs from the defaults. rig: where the campaign has its kind of flight, if it is no
-    aircraft. often: how many of the campaign's flights it flies, beside the others' numbers; or,
-    where it replaces another, it flies one in so many of that one's.
+    name: no other link's. links: its device nodes, in the order in which they are started.
+    parameters: of these nodes and the supervisor, node -> what differs from the defaults. rig:
+    where the campaign has its kind of flight, if it is no aircraft. often: how many of the
+    campaign's flights it flies, beside the others' numbers; or, where it replaces another, it
+    flies one in so many of that one's.
     """
 
     name: str
@@ -142,9 +147,10 @@ class LinkKind:
     """One kind of link, and where its parts are. Places are imported when they are needed: the
     campaign runs without ROS.
 
-    name: of the node and of its executable. vehicles: those that carry its device. connection:
-    where the node finds what simulators, command lines of one vehicle, simulate. part: empty
-    where the campaign does not fly it.
+    name: of the node and of its executable. node: its class; __main__.py is beside its module.
+    vehicles: those that carry its device. simulators: command lines for one vehicle, each
+    begins with an executable and takes `--control PATH` besides. connection: where the node finds
+    what they simulate. part: empty where the campaign does not fly it.
     """
 
     name: str
@@ -164,6 +170,14 @@ class LinkKind:
 
 
 def load(place: Place) -> Any:
-    """Return the object at a place."""
+    """Return the object at a place. NotRegisteredError: it is not there."""
     module, _, attribute = place.partition(":")
-    return getattr(importlib.import_module(module), attribute)
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except NotBuiltError:
+        raise
+    except (ImportError, AttributeError) as error:
+        raise NotRegisteredError(
+            f"{place}, which a link names, cannot be imported: {error}: correct the place in its "
+            "LinkKind, or install what it needs"
+        ) from error

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from chute_ros.errors import ChuteError, ParameterError
-from chute_ros.links.api import SUPERVISOR, load
-from chute_ros.links.registered import links, vehicles
+from chute_ros.links.api import SUPERVISOR, VehicleKind, load
+from chute_ros.links.registered import links, package_of, vehicles
 from chute_ros.ros.parameter_file import given_in, named_in
 from chute_ros.ros.parameters import MISSPELT, check_names, nearest
 from chute_ros.ros.supervisor_parameters import SupervisorParameters
@@ -176,6 +176,11 @@ def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[Simulat
     orders = {one.name: one.orders for one in actions_of(simulators)}
     known = [word for word, name in FAILURES.items() if name in orders]
     seconds = _number(after)
+    if not known:
+        raise ParameterError(
+            f"fail is {text!r}: nothing can fail in a vehicle with {', '.join(simulators)}: leave "
+            "fail out"
+        )
     if what not in known or not 0.0 <= seconds <= 3600.0:
         raise ParameterError(
             f"fail is {text!r}: need one of {', '.join(known)}, @ and seconds after the take-off "
@@ -226,21 +231,41 @@ def check_file(
     """The parameter file of these nodes. connections: node -> what overrides the file's.
     ParameterError: it cannot be read, or has nothing for one of them, or what it has cannot be."""
     for name in nodes:
-        kind = _settings_of(name)
+        known = [one.name for one in parameters_of(_settings_of(name))]
         given = given_in(path, f"{namespace}/{name}")
-        if name in connections:
-            given = {**given, "connection": connections[name]}
-        known = [one.name for one in parameters_of(kind)]
         for other in given.keys() - set(known):
             if near := nearest(other, known, MISSPELT):
                 raise ParameterError(
                     f"{path}: {name} has no parameter {other}: did you mean {near}?"
                 )
         check_names(named_in(path, f"{namespace}/{name}"), known, f"{path}: {name}")
-        try:
-            settings_from(kind, {one: given[one] for one in known if one in given})
-        except ParameterError as error:
-            raise ParameterError(f"{path}: {name}: {error}") from None
+        own = {one: given[one] for one in known if one in given}
+        _check_values(name, _with_connection(own, connections.get(name)), str(path))
+
+
+def check_vehicle(vehicle: VehicleKind, connections: Mapping[str, str]) -> dict[str, Any]:
+    """Node -> what a vehicle without a parameter file gives it. connections: node -> its own.
+    ParameterError: a link's entry has given a parameter that is none, or cannot be so."""
+    given = {}
+    for name in (*vehicle.links, SUPERVISOR):
+        known = [one.name for one in parameters_of(_settings_of(name))]
+        own = vehicle.parameters.get(name, {})
+        whose = f"vehicle {vehicle.name} of {package_of(vehicle.name)}"
+        check_names(own, known, f"{whose}: {name}")
+        given[name] = _with_connection(own, connections.get(name))
+        _check_values(name, given[name], whose)
+    return given
+
+
+def _with_connection(given: Mapping[str, Any], connection: str | None) -> dict[str, Any]:
+    return {**given, "connection": connection} if connection else {**given}
+
+
+def _check_values(node: str, given: Mapping[str, Any], whose: str) -> None:
+    try:
+        settings_from(_settings_of(node), given)
+    except ParameterError as error:
+        raise ParameterError(f"{whose}: {node}: {error}") from None
 
 
 def _settings_of(name: str) -> type[Settings]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from chute_ros.campaign.description import FIELDS
 from chute_ros.links.api import SUPERVISOR, VehicleKind, load
-from chute_ros.links.registered import links, vehicles
+from chute_ros.links.registered import links, package_of, vehicles
 from chute_ros.ros.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.settings import Parameter, parameters_of
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
@@ -37,7 +37,7 @@ DESCRIPTION = Path("docs/guide/minimum_height.md")
 CONFIGS: dict[Path, VehicleKind] = {
     Path(f"config/{name}_vehicle.yaml"): vehicle
     for name, vehicle in vehicles().items()
-    if NODES.keys() >= {*vehicle.links}
+    if package_of(name) == "chute_ros"
 }
 _HEAD = """\
 # Parameters of one vehicle with {}. The keys

@@ -6,9 +6,10 @@ import os
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 
-from chute_ros.errors import ParameterError
+from chute_ros.errors import NotRegisteredError, ParameterError
 from chute_ros.links.api import Sockets, VehicleKind
 from chute_ros.links.registered import links, vehicles
 
@@ -43,6 +44,17 @@ def simulators_of(name: str) -> tuple[str, ...]:
     """The executables of a vehicle's simulators."""
     nowhere = SimulatedVehicle(name, Sockets("", "", "", ""), Path())
     return tuple(command[0] for _, command in nowhere.simulators())
+
+
+def simulator_module(executable: str) -> str:
+    """The module of a simulator, for python -m. NotRegisteredError: it has none, or several."""
+    found = {one.module for one in entry_points(group="console_scripts", name=executable)}
+    if len(found) != 1:
+        raise NotRegisteredError(
+            f"simulator {executable} is {' and '.join(sorted(found)) or 'no module'}: need one "
+            "module for it among the console_scripts of all packages"
+        )
+    return found.pop()
 
 
 def control_path(folder: Path | str, simulator: str) -> str:

@@ -22,7 +22,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from hashlib import sha256
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import NoReturn
 
@@ -40,12 +39,12 @@ from chute_ros.tools.bench_call import call_action
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
-from chute_ros.tools.launch_checks import FlightArguments
+from chute_ros.tools.launch_checks import FlightArguments, check_vehicle
 from chute_ros.tools.processes import Processes, ros_arguments
-from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
+from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulator_module, simulators_of
 
-#: What a drone can carry, and what a rocket is, as simulation.launch.py names them.
-DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
+#: What a rocket is, as simulation.launch.py names it.
+ROCKET = "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
 _PASSWORD = "password"
@@ -103,7 +102,7 @@ def _options() -> argparse.ArgumentParser:
     )
     options.add_argument(
         "--parachute",
-        choices=DRONES,
+        choices=[name for name in vehicles() if name != ROCKET],
         default="mavlink",
         help="parachute of the drone (default: mavlink)",
     )
@@ -206,18 +205,14 @@ def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> No
         f"{local}:{network}", f"{local}:{air}", f"mcast:0:{bus}", f"{folder}/terminal"
     )
     vehicle = SimulatedVehicle(_vehicle(chosen), sockets, folder)
-    wires = vehicle.connections()
-    for node in (*vehicle.kind.links, SUPERVISOR):
-        given = dict(vehicle.kind.parameters.get(node, {}))
-        if node in wires:
-            given["connection"] = wires[node]
+    for node, given in check_vehicle(vehicle.kind, vehicle.connections()).items():
         # JSON is YAML as well.
         told = {name: json.dumps(value) for name, value in given.items()}
         processes.start(node, module_of(node), *ros_arguments(chosen.namespace, **told))
-    modules = {one.name: one.module for one in entry_points(group="console_scripts")}
     flight = FlightArguments().options(simulators_of(vehicle.name))
     for _, (simulator, *arguments) in vehicle.simulators():
-        processes.start(simulator, modules[simulator], *arguments, *flight.get(simulator, ()))
+        module = simulator_module(simulator)
+        processes.start(simulator, module, *arguments, *flight.get(simulator, ()))
     bench = ros_arguments(chosen.namespace, vehicle=vehicle.name, folder=folder)
     processes.start("sim_bench", "chute_ros.tools.sim_bench", *bench)
     if not chosen.no_panel:
@@ -261,7 +256,8 @@ def _play(
         print(f"    {one.name:<24}{one.title}")
     print(f"\n  in another terminal:\n    {_environment()}")
     print(f"    {_command('chute')} --namespace {namespace} watch")
-    (begin,) = [one.name for one in actions if one.leaves_ground]
-    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {begin}")
+    for one in actions:
+        if one.leaves_ground:
+            print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {one.name}")
     print("\n  Ctrl-C ends it all.\n", flush=True)
     director.until("it goes on", math.inf, lambda: False)

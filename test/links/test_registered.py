@@ -3,14 +3,12 @@
 import ast
 import inspect
 import json
-import os
-import subprocess
-import sys
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+from other_package import OTHERS, changed, other_package, python
 
 from chute_ros.campaign.scenario import part
 from chute_ros.errors import NotRegisteredError
@@ -90,44 +88,11 @@ def test_each_vehicle_carries_links_that_there_are():
             assert {*vehicle.supervised(name)} <= {*vehicle.links}, (vehicle.name, name)
 
 
-OTHERS = """
-from dataclasses import replace
-from chute_ros.links.relay import LINK as RELAY
-
-LINK = replace(
-    RELAY,
-    name="rocket_motor",
-    node="other_link.node:Node",
-    package="other_package",
-    vehicles=(replace(RELAY.vehicles[0], name="other", links=("rocket_motor",), replaces=""),),
-)
-"""
 TELL = """
 import json
 from chute_ros.links.registered import links, module_of, vehicles
-from chute_ros.runtime.device import DeviceRuntime
 print(json.dumps([list(links()), list(vehicles()), module_of("rocket_motor")]))
 """
-
-
-def python(code, folder):
-    path = os.pathsep.join([str(folder), *filter(None, sys.path)])
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def other_package(folder, entry, code=OTHERS):
-    (folder / "other_link").mkdir()
-    (folder / "other_link" / "__init__.py").write_text(code)
-    information = folder / "other_package-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text(f"[chute_ros.links]\n{entry}\n")
 
 
 def test_a_link_of_another_package_is_found_behind_ours(tmp_path):
@@ -135,9 +100,159 @@ def test_a_link_of_another_package_is_found_behind_ours(tmp_path):
     done = python(TELL, tmp_path)
     assert done.returncode == 0, done.stderr
     names, carried, module = json.loads(done.stdout)
-    assert names == [*links(), "rocket_motor"]
-    assert carried == [*vehicles(), "other"]
+    assert names[: len(links())] == [*links()]
+    assert carried[: len(vehicles())] == [*vehicles()]
+    assert "rocket_motor" in names
+    assert "other" in carried
     assert module == "other_link"
+
+
+def refused(folder, code, tell=TELL, entry="rocket_motor = other_link:LINK"):
+    """What is said once a program has met the link of this code."""
+    other_package(folder, entry, code)
+    done = python(tell, folder)
+    assert done.returncode == 1, done.stdout
+    return done.stderr.splitlines()[-1]
+
+
+MAVLINK = "chute_ros.links mavlink_parachute = chute_ros.links.mavlink:LINK"
+#: A name that is taken -> what of OTHERS is otherwise, and whose it is.
+TAKEN = {
+    "node relay": (
+        *('"rocket_motor"', '"relay"'),
+        "chute_ros.links relay = chute_ros.links.relay:LINK",
+    ),
+    "node safety_supervisor": (
+        *('"rocket_motor"', '"safety_supervisor"'),
+        "the supervisor",
+    ),
+    "vehicle mavlink": ('"other"', '"mavlink"', MAVLINK),
+    "launch argument connection": ('"motor"', '"connection"', MAVLINK),
+    "device upf": (
+        *("    package=", '    device="upf", kit="other_link:KIT", package='),
+        "chute_ros.links upf_can = chute_ros.links.upf:LINK",
+    ),
+    **{
+        f"launch argument {name}": ('"motor"', f'"{name}"', "the launch files of chute_ros")
+        for name in registered.LAUNCH_ARGUMENTS
+    },
+}
+
+
+@pytest.mark.parametrize("what", TAKEN)
+@pytest.mark.parametrize("first", [True, False])
+def test_a_name_that_is_taken_is_refused_with_both_owners_wherever_they_are_on_the_path(
+    tmp_path, what, first
+):
+    old, new, whose = TAKEN[what]
+    kind, _, name = what.rpartition(" ")
+    entry = f"{name if kind == 'node' else 'rocket_motor'} = other_link:LINK"
+    other_package(tmp_path, entry, changed(old, new))
+    done = python(TELL, tmp_path, first)
+    assert done.returncode == 1, done.stdout
+    said = done.stderr.splitlines()[-1].partition("NotRegisteredError: ")[2]
+    theirs = f"chute_ros.links {entry}"
+    end = "give one of them another name, or remove its package"
+    assert said in {
+        f"{one}: the {what} is also that of {other}: {end}"
+        for one, other in ((theirs, whose), (whose, theirs))
+    }
+
+
+def test_an_entry_that_is_found_twice_is_one_link(tmp_path):
+    other_package(tmp_path, "relay = chute_ros.links.relay:LINK")
+    done = python("from chute_ros.links.registered import links; print(*links())", tmp_path)
+    assert done.stdout.split().count("relay") == 1, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'links=("rocket_motor",)',
+            'links=("mavlink_parachut", "rocket_motor")',
+            "there is no link mavlink_parachut: need links of mavlink_parachute, relay, ",
+        ),
+        (
+            "parameters={SUPERVISOR: NAMED}",
+            'parameters={SUPERVISOR: NAMED, "relay": {}}',
+            "parameters has relay, which it does not start: need one of rocket_motor, safety_sup",
+        ),
+        (
+            '{"required_links": LINKS',
+            '{"required_link": LINKS',
+            "safety_supervisor has no parameter required_link: did you mean required_links?",
+        ),
+        (
+            '"kill_links": LINKS, ',
+            "",
+            "kill_links of safety_supervisor has mavlink_parachute, which it does not start: ",
+        ),
+        (
+            'LINKS = ["rocket_motor"]',
+            'LINKS = ("rocket_motor",)',
+            "required_links of safety_supervisor is ('rocket_motor',): need a list of links",
+        ),
+        ('replaces=""', 'replaces="mavlnk"', "replaces is 'mavlnk': need one of mavlink, relay, "),
+    ],
+)
+def test_a_vehicle_that_names_what_is_not_there_is_refused(tmp_path, old, new, said):
+    told = refused(tmp_path, changed(old, new))
+    assert "NotRegisteredError: vehicle other of other_package: " + said in told
+
+
+def test_a_place_that_is_not_there_is_named_to_who_needs_it(tmp_path):
+    code = changed("    package=", '    parameters="other_link.none:Settings", package=')
+    tell = (
+        "from chute_ros.links.api import load; from chute_ros.links.registered import links; "
+        "load(links()['rocket_motor'].parameters)"
+    )
+    assert (
+        "NotRegisteredError: other_link.none:Settings, which a link names, cannot be imported: "
+        "No module named 'other_link.none': correct the place in its LinkKind, or install "
+        "what it needs"
+    ) in refused(tmp_path, code, tell)
+
+
+def test_a_campaign_with_a_part_that_is_not_there_ends_in_one_line(tmp_path):
+    code = changed("    package=", '    part="other_link.none:Part", package=')
+    other_package(tmp_path, "rocket_motor = other_link:LINK", code)
+    tell = (
+        "import sys; sys.argv = ['campaign', '--flights', '1']; "
+        "from chute_ros.tools.campaign import main; main()"
+    )
+    done = python(tell, tmp_path)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("campaign: other_link.none:Part, which a link names, cannot be ")
+
+
+def test_a_tool_that_is_started_beside_a_wrong_link_ends_in_one_line(tmp_path):
+    other_package(tmp_path, "rocket_motor = other_link:LINK", changed('"other"', '"mavlink"'))
+    tell = "import sys; from chute_ros.tools.{0} import main; sys.argv = ['{0}', '--help']; main()"
+    for tool in ("campaign", "sim"):
+        done = python(tell.format(tool), tmp_path)
+        assert done.returncode == 2
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"{tool}: chute_ros.links rocket_motor = other_link:LINK: the ")
+
+
+def test_the_defaults_of_a_node_need_no_settings_of_another(tmp_path):
+    other_package(
+        tmp_path,
+        "rocket_motor = other_link:LINK",
+        changed("    package=", '    parameters="other_link.none:Settings", package='),
+    )
+    tell = (
+        "from chute_ros.tools.chute.defaults import defaults_for as told; "
+        "from chute_ros.tools.parameter_docs import NODES\n"
+        "for node in ('safety_supervisor', 'relay'):\n"
+        "    names = [one.name for one in NODES[node]]\n"
+        "    print(len(told(node, names)) == len(told('by_another_name', names)) == len(names))\n"
+        "print(told('rocket_motor', ['connection']))"
+    )
+    done = python(tell, tmp_path)
+    assert done.stdout.splitlines() == ["True", "True", "{}"], done.stderr
 
 
 def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(tmp_path):

@@ -6,12 +6,15 @@ import itertools
 import subprocess
 import sys
 import tempfile
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
+import ament_index_python.packages as ament
 import pytest
 from launch_files import LAUNCH, Recorded, loaded, made_by
+from other_package import OTHERS, changed, other_package
 
+from chute_ros.links import registered
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
 from chute_ros.links.upf.protocol.parameters import AUTOMATIC
@@ -73,6 +76,16 @@ def test_the_files_that_they_name_are_installed():
                     assert (ROOT / text.removeprefix("{share}/")).is_file(), text
 
 
+def test_no_link_can_have_an_argument_that_they_have_themselves():
+    declared = {
+        ast.literal_eval(call[0])
+        for file in FILES
+        for call in calls(file, "DeclareLaunchArgument")
+        if call[0].startswith("'")
+    }
+    assert declared == {*registered.LAUNCH_ARGUMENTS}
+
+
 def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
     for parachute in vehicles():
         assert (ROOT / "config" / f"{parachute}_vehicle.yaml").is_file()
@@ -105,11 +118,157 @@ def test_the_simulators_take_the_options_that_are_given_to_them():
         assert {one for one in options if one not in known} == set(), name
 
 
-def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
-    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
-    for node in calls(vehicle, "Node"):
-        assert node["namespace"] == "namespace"
-        assert "config" in node["parameters"]
+def nodes_of(monkeypatch, **given):
+    """What vehicle.launch.py starts: executable -> with what."""
+    made = made_by(LAUNCH / "vehicle.launch.py", monkeypatch, **given)
+    return {one.options["executable"]: one.options for one in made if "executable" in one.options}
+
+
+def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file(monkeypatch):
+    given = {"parachute": "upf", "namespace": "drone1", "bus": "socketcan:can0"}
+    for node, options in nodes_of(monkeypatch, **given).items():
+        assert options["namespace"] == "drone1"
+        file, *more = options["parameters"]
+        assert file.endswith("/config/upf_vehicle.yaml")
+        assert more == ([{"connection": "socketcan:can0"}] if node == "upf_can" else [])
+
+
+def install(folder, monkeypatch, code=OTHERS, shares=None):
+    """Have a link of another package; shares: ROS package -> its share folder."""
+    other_package(folder, code=code)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "other_link", raising=False)
+    entry = EntryPoint("rocket_motor", "other_link:LINK", registered.GROUP)
+    ours = registered.entry_points(group=registered.GROUP)
+    monkeypatch.setattr(registered, "entry_points", lambda group: [*ours, entry])
+    for known in (links, vehicles):
+        known.cache_clear()
+    share = ament.get_package_share_directory
+
+    def share_of(package):
+        if package != "other_package":
+            return share(package)
+        if not shares:
+            raise ament.PackageNotFoundError(package)
+        return str(shares)
+
+    monkeypatch.setattr(ament, "get_package_share_directory", share_of)
+
+
+@pytest.fixture
+def another(folder, monkeypatch):
+    """Call it to install another package."""
+    yield lambda **how: install(folder, monkeypatch, **how)
+    monkeypatch.undo()
+    for known in (links, vehicles):
+        known.cache_clear()
+
+
+def test_a_vehicle_of_another_package_without_a_file_gets_what_its_entry_says(
+    another, monkeypatch, capsys
+):
+    another()
+    nodes = nodes_of(monkeypatch, parachute="other", namespace="rocket", motor="file:/tmp/motor")
+    named = {key: ["rocket_motor"] for key in ("required_links", "kill_links", "deploy_links")}
+    assert nodes["rocket_motor"]["package"] == "other_package"
+    assert nodes["rocket_motor"]["parameters"] == [{"connection": "file:/tmp/motor"}]
+    assert nodes["safety_supervisor"]["parameters"] == [named]
+    told = capsys.readouterr().err
+    assert told.startswith("vehicle.launch.py: other_package has no config/other_vehicle.yaml: ")
+    assert told.endswith("(or config:=FILE)\n")
+
+
+FILE = """
+/**/rocket_motor:
+  ros__parameters:
+    pulse_time: 3.0
+/**/safety_supervisor:
+  ros__parameters:
+    required_links: [rocket_motor]
+"""
+
+
+def test_a_vehicle_of_another_package_gets_the_file_that_this_package_has(
+    another, folder, monkeypatch, capsys
+):
+    (folder / "config").mkdir()
+    file = folder / "config" / "other_vehicle.yaml"
+    file.write_text(FILE)
+    another(shares=folder)
+    for node in nodes_of(monkeypatch, parachute="other", namespace="rocket").values():
+        assert node["parameters"] == [str(file)]
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "SUPERVISOR: NAMED}",
+            'SUPERVISOR: NAMED, "rocket_motor": {"pulse_tme": 3.0}}',
+            "rocket_motor has no parameter pulse_tme: did you mean pulse_time?",
+        ),
+        (
+            "SUPERVISOR: NAMED}",
+            'SUPERVISOR: NAMED, "rocket_motor": {"pulse_time": 3}}',
+            "rocket_motor: parameter pulse_time is 3: need a number (1.0, not 1) from ",
+        ),
+        (
+            "SUPERVISOR: NAMED}",
+            'SUPERVISOR: {**NAMED, "min_battery": 0.5}}',
+            "safety_supervisor has no parameter min_battery",
+        ),
+    ],
+)
+def test_an_entry_that_gives_a_parameter_that_cannot_be_ends_the_launch_in_one_line(
+    old, new, said, another, monkeypatch, capsys
+):
+    another(code=changed(old, new))
+    with pytest.raises(SystemExit) as ended:
+        nodes_of(monkeypatch, parachute="other", namespace="rocket")
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"vehicle.launch.py: vehicle other of other_package: {said}")
+    assert told.count("\n") == 1
+
+
+def test_a_wrong_link_ends_the_launch_in_one_line(another, monkeypatch, capsys):
+    another(code=changed('name="other"', 'name="mavlink"'))
+    for file in FILES:
+        space = loaded(file, monkeypatch)
+        with pytest.raises(SystemExit) as ended:
+            space["generate_launch_description"]()
+        assert ended.value.code == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"{file.name}: chute_ros.links rocket_motor = other_link:LINK: the")
+        assert told.count("\n") == 1
+
+
+def test_a_simulation_gives_the_vehicle_the_file_that_is_given(monkeypatch):
+    for given in ("", "/tmp/mine.yaml"):
+        made = made_by(
+            LAUNCH / "simulation.launch.py", monkeypatch, parachute="mavlink", config=given
+        )
+        (included,) = [one for one in made if type(one).__name__ == "IncludeLaunchDescription"]
+        assert dict(included.options["launch_arguments"])["config"] == given
+
+
+def test_a_vehicle_whose_simulators_have_no_failures_says_so(another, monkeypatch, capsys):
+    code = changed(
+        "LINK = replace(",
+        """
+def simulators(vehicle, sockets):
+    return (("sim_motor", "--link", sockets.terminal),)
+
+LINK = replace(""",
+    ).replace("    package=", "    simulators=simulators, package=")
+    another(code=code)
+    with pytest.raises(SystemExit):
+        made_by(LAUNCH / "simulation.launch.py", monkeypatch, parachute="other", fail="motor@5")
+    assert capsys.readouterr().err == (
+        "simulation.launch.py: fail is 'motor@5': nothing can fail in a vehicle with sim_motor: "
+        "leave fail out\n"
+    )
 
 
 #: Parachute -> what vehicle.launch.py starts for it, and simulation.launch.py beside that.

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import threading
-from importlib.metadata import entry_points
 
 import pytest
 from chute_msgs.msg import SafetyState
@@ -17,7 +16,7 @@ from chute_ros.ros import qos
 from chute_ros.sim.bench_actions import actions_of
 from chute_ros.tools.bench_node import BenchNode
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
+from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulator_module, simulators_of
 
 
 class Vehicle:
@@ -31,10 +30,9 @@ class Vehicle:
         )
         vehicle = SimulatedVehicle(name, sockets, bench.folder)
         self.bench, self.lines = bench, []
-        modules = {one.name: one.module for one in entry_points(group="console_scripts")}
         for _, (simulator, *arguments) in vehicle.simulators():
             process = subprocess.Popen(
-                [sys.executable, "-m", modules[simulator], *arguments],
+                [sys.executable, "-m", simulator_module(simulator), *arguments],
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 text=True,

@@ -1,14 +1,17 @@
 """The arguments of simulation.launch.py: what the simulators are told, and each mistake."""
 
 import os
+from importlib.metadata import EntryPoint
 
 import pytest
+from other_package import other_package, python
 
-from chute_ros.errors import ParameterError
+from chute_ros.errors import NotRegisteredError, ParameterError
 from chute_ros.links.registered import vehicles
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
+from chute_ros.tools import simulated_vehicle
 from chute_ros.tools.launch_checks import FAILURES, FlightArguments
-from chute_ros.tools.simulated_vehicle import own_folder, simulators_of
+from chute_ros.tools.simulated_vehicle import own_folder, simulator_module, simulators_of
 
 DRONE, ROCKET = simulators_of("mavlink"), simulators_of("umbilical")
 CALM = ["--at", "0:wind=0.5"]
@@ -122,3 +125,30 @@ def test_the_folder_of_the_sockets_is_for_this_user_alone(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ParameterError, match="need a folder for sockets"):
         own_folder(tmp_path / "file")
+
+
+@pytest.mark.parametrize(
+    ("places", "said"),
+    [
+        ([], "simulator sim_motor is no module: need one module for it among the console_scripts"),
+        (["ours.sim:main", "theirs:main"], "simulator sim_motor is ours.sim and theirs: need one"),
+    ],
+)
+def test_a_simulator_is_one_module(places, said, monkeypatch):
+    def installed(group, name):
+        return [EntryPoint(name, place, group) for place in places]
+
+    monkeypatch.setattr(simulated_vehicle, "entry_points", installed)
+    with pytest.raises(NotRegisteredError, match=f"^{said}"):
+        simulator_module("sim_motor")
+
+
+def test_a_simulation_can_carry_the_vehicle_of_another_package(tmp_path):
+    other_package(tmp_path)
+    tell = "import sys; sys.argv = ['sim', '--help']; from chute_ros.tools.sim import main; main()"
+    done = python(tell, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert f"--parachute {{{','.join(one for one in vehicles() if one != 'umbilical')}" in (
+        done.stdout
+    )
+    assert ",other" in done.stdout

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import contextlib
+from collections.abc import Collection, Iterator, Mapping
 
+from chute_ros.errors import NotRegisteredError
 from chute_ros.links.api import SUPERVISOR, load
 from chute_ros.links.registered import links
 from chute_ros.ros.supervisor_parameters import PARAMETERS
@@ -13,10 +15,23 @@ from chute_ros.settings import Parameter, Value, parameters_of
 def defaults_for(node: str, names: Collection[str]) -> Mapping[str, Value]:
     """Parameter -> default. node: its name, if it is that of its kind; otherwise the kind all of
     whose parameters it has. Empty: it is none of ours."""
-    kinds: dict[str, tuple[Parameter, ...]] = {SUPERVISOR: PARAMETERS}
-    for name, kind in links().items():
-        kinds[name] = parameters_of(load(kind.parameters))
     has = set(names)
-    whole = [name for name, known in kinds.items() if {one.name for one in known} <= has]
-    fitting = node if node in whole else max(whole, key=lambda one: len(kinds[one]), default="")
-    return {one.name: one.default for one in kinds.get(fitting, ())}
+
+    def fits(known: tuple[Parameter, ...]) -> bool:
+        return {one.name for one in known} <= has
+
+    fitting: tuple[Parameter, ...] = next(filter(fits, _kinds(node)), ())
+    if not fitting:
+        fitting = max(filter(fits, _kinds(SUPERVISOR, *links())), key=len, default=())
+    return {one.name: one.default for one in fitting}
+
+
+def _kinds(*nodes: str) -> Iterator[tuple[Parameter, ...]]:
+    """All parameters of each of these nodes that is known here, and whose settings are there."""
+    for node in nodes:
+        if node == SUPERVISOR:
+            yield PARAMETERS
+        elif node in links():
+            # Where they are not there, no such node runs here.
+            with contextlib.suppress(NotRegisteredError):
+                yield parameters_of(load(links()[node].parameters))
