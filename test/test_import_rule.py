@@ -50,7 +50,18 @@ OFFENDERS = [
     ("protocol", "from chute_ros.ros import offender", "chute_ros.ros"),
     ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
     ("sim", "from chute_ros.ros import offender", "chute_ros.ros"),
+    ("links.relay.protocol", "from chute_ros.supervisor import core", "chute_ros.supervisor.core"),
+    ("links.relay.protocol", "from chute_ros.runtime import device", "chute_ros.runtime.device"),
+    ("links.upf.simulator", "from chute_ros.campaign import world", "chute_ros.campaign.world"),
+    ("links.upf.conformance", "from chute_ros.sim import lies", "chute_ros.sim.lies"),
 ]
+#: Part of a link that is one file -> what it must not know.
+OFFENDING_PARTS = {
+    "runtime": "chute_ros.transport.offender",
+    "node": "chute_ros.campaign.world",
+    "diagnostics": "chute_ros.sim.lies",
+    "virtual": "chute_ros.tools.arguments",
+}
 
 
 def test_the_rule_names_each_offender(copy):
@@ -59,10 +70,15 @@ def test_the_rule_names_each_offender(copy):
     for number, (package, line, _) in enumerate(OFFENDERS):
         file = copy / "chute_ros" / package.replace(".", "/") / f"offending_{number}.py"
         file.write_text(line + "\n")
+    for part, named in OFFENDING_PARTS.items():
+        with (copy / "chute_ros" / "links" / "upf" / f"{part}.py").open("a") as file:
+            file.write(f"\nimport {named}\n")
     result = lint(copy)
     assert result.returncode == 1
     for number, (package, _, named) in enumerate(OFFENDERS):
         assert f"chute_ros.{package}.offending_{number} -> {named}" in result.stdout
+    for part, named in OFFENDING_PARTS.items():
+        assert f"chute_ros.links.upf.{part} -> {named}" in result.stdout
 
 
 def test_a_shared_type_may_import_nothing_of_ours(copy):
