@@ -22,11 +22,14 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.tools.mcap_entries import McapEntries
 
 FORMAT = "ROS recording"
 
 _NANO = 1e-9
+#: Its times are of a clock that can be set: a longer silence is one that was, s.
+_SILENCE = 10.0
 #: Of times by their ages, s.
 _ROUNDING = 0.005
 _SUITE, _TARGET = "vehicle/state", "setpoint_raw/target_attitude"
@@ -66,13 +69,15 @@ def read(path: Path) -> FlightLog:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _end_of(one.topic)]
             # Of none of them it would give all.
-            for connection, time, raw in reader.messages(connections=chosen) if chosen else ():
+            every = reader.messages(connections=chosen) if chosen else ()
+            stamped = ((time * _NANO, (connection, raw)) for connection, time, raw in every)
+            for at, (connection, raw) in steady(stamped, teller.remarks, _SILENCE):
                 try:
                     message = reader.deserialize(raw, connection.msgtype)
                 except (KeyError, TypesysError):
                     teller.unknown.add(connection.msgtype)
                     continue
-                teller.take(_end_of(connection.topic), message, time * _NANO)
+                teller.take(_end_of(connection.topic), message, at)
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes of its reader
         raise LogError(f"{path}: no recording of ROS that can be read: {reason(error)}") from None
     return teller.log(path)
@@ -86,7 +91,8 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
     except RecordError as error:
         raise LogError(f"no recording of ROS that can be read: {error}") from None
     definitions: dict[int, Any] = {}
-    for entry in sorted(chosen, key=lambda one: one.time):
+    stamped = ((one.time * _NANO, one) for one in chosen)
+    for at, entry in steady(stamped, teller.remarks, _SILENCE):
         schema = entry.schema
         if schema.id not in definitions:
             definitions[schema.id] = _definition(schema)
@@ -95,7 +101,7 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
         except Exception:  # noqa: BLE001 - whatever damage makes of its reader
             teller.unknown.add(schema.name)
             continue
-        teller.take(_end_of(entry.channel.topic), message, entry.time * _NANO)
+        teller.take(_end_of(entry.channel.topic), message, at)
     log = teller.log(path)
     log.remarks.extend(entries.remarks)
     return log
@@ -134,6 +140,8 @@ class _Teller:
     def __init__(self) -> None:
         self._out = MessageLog()
         self.unknown: set[str] = set()
+        #: What a reader must be told of the recording.
+        self.remarks: list[str] = []
         self._vehicle_type = dialect.MAV_TYPE_QUADROTOR
         self._autopilot = dialect.MAV_AUTOPILOT_GENERIC
         #: Part -> its newest values, and from which topic: of several the first that told it.
@@ -159,13 +167,13 @@ class _Teller:
 
     def log(self, path: Path) -> FlightLog:
         """All of it; LogError: nothing of a vehicle."""
-        remarks: list[str] = []
+        remarks = self.remarks
         if "armed" not in self._newest:
             remarks.append("nothing tells when it was armed: taken to be armed throughout")
             beat = told.heartbeat(self._vehicle_type, self._autopilot, True)
             for at in self._out.seconds():
                 self._out.add_change(at, beat)
-        messages = self._out.in_order(remarks)
+        messages = self._out.in_order()
         if not any(one.get_type() == "GLOBAL_POSITION_INT" for _, one in messages):
             wants = "vehicle/state, or mavros/global_position/rel_alt, altitude or local_position"
             types = ", ".join(sorted(self.unknown))

@@ -11,6 +11,7 @@ import contextlib
 import io
 import math
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "ArduPilot DataFlash"
@@ -103,10 +105,19 @@ def _told(path: Path, reader: Any, console: str) -> FlightLog:
     teller.said(console)
     # It closes nothing itself.
     with reader.filehandle, reader.data_map:
-        while (entry := reader.recv_msg()) is not None:
-            if entry.get_type() in _READ:
-                teller.take(entry)
-    return teller.log(path)
+        remarks: list[str] = []
+        for at, entry in steady(_stamped(reader, teller), remarks):
+            teller.take(entry, at)
+    return teller.log(path, remarks)
+
+
+def _stamped(reader: Any, teller: _Teller) -> Iterator[tuple[float, Any]]:
+    """Each entry of a moment with its own time (s); the parameters, which have none, are told."""
+    while (entry := reader.recv_msg()) is not None:
+        if entry.get_type() == "PARM":
+            teller.parameter(entry)
+        elif entry.get_type() in _READ:
+            yield entry._timestamp, entry
 
 
 class _Teller:
@@ -141,16 +152,13 @@ class _Teller:
             "ARM": self._arm,
             "STAT": self._stat,
             "ORGN": self._origin,
-            "PARM": self._parm,
             "MSG": self._msg,
         } | dict.fromkeys(_IMUS, self._imu)
 
-    def take(self, entry: Any) -> None:
-        """One entry of the log."""
+    def take(self, entry: Any, at: float) -> None:
+        """One entry of the log (s), none sooner than those before."""
         kind = entry.get_type()
-        if kind != "PARM":
-            # Clocks of old logs go back by fractions of a second.
-            self._at = max(self._at, entry._timestamp)
+        self._at = at
         self._newest[kind] = entry
         for number, (message, name, factor) in enumerate(_SPEEDS[: self._speed_of + 1]):
             if kind == message and hasattr(entry, name) and _instance(entry) == 0:
@@ -167,12 +175,11 @@ class _Teller:
             if name in text:
                 self._vehicle_type = vehicle_type
 
-    def log(self, path: Path) -> FlightLog:
-        """All of it."""
+    def log(self, path: Path, remarks: list[str]) -> FlightLog:
+        """All of it. remarks: on how it was read."""
         vehicle_type = self._vehicle_type
         if self._parameters.get("Q_ENABLE", 0) > 0:
             vehicle_type = VTOL
-        remarks = []
         if "POS" not in self._newest:
             for at, message in self._by_controller or self._by_ahr2:
                 self._out.add(at, message)
@@ -185,7 +192,7 @@ class _Teller:
             FORMAT,
             vehicle_type,
             dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-            self._out.in_order(remarks),
+            self._out.in_order(),
             self._parameters,
             remarks=remarks,
         )
@@ -295,7 +302,8 @@ class _Teller:
     def _msg(self, entry: Any) -> None:
         self.said(str(entry.Message))
 
-    def _parm(self, entry: Any) -> None:
+    def parameter(self, entry: Any) -> None:
+        """One of the autopilot's."""
         value = float(entry.Value)
         self._parameters[entry.Name] = int(value) if value.is_integer() else value
 

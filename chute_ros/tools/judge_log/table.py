@@ -11,6 +11,7 @@ import itertools
 import math
 import re
 import statistics
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from pathlib import Path
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "table"
@@ -93,7 +95,6 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
             values.append(one)
         else:
             bad += 1
-    values.sort(key=lambda one: one["time"])
     headings = rows[begin - 1]
     used = ", ".join(f"{name} from {headings[at].strip()!r}" for name, (at, _) in places.items())
     if len(values) < 2:
@@ -117,6 +118,8 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
 def _check_times(path: Path, times: Sequence[float], heading: str) -> None:
     """LogError: in seconds they cannot be."""
     apart = statistics.median(b - a for a, b in itertools.pairwise(times))
+    if apart < 0.0:
+        raise LogError(f"{path}: its rows are not in the order of time, by {heading.strip()!r}")
     if apart > _FURTHEST_APART:
         raise LogError(
             f"{path}: its rows are {apart:.3g} s apart: if {heading.strip()!r} is in other units, "
@@ -187,15 +190,16 @@ def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tup
     ground = values[0]["height"]
     beat = told.heartbeat(dialect.MAV_TYPE_ROCKET, dialect.MAV_AUTOPILOT_GENERIC, True)
     beat_at = -math.inf
-    oldest = 0
-    for number, one in enumerate(values):
-        at, height = one["time"], one["height"] - ground
-        while values[oldest]["time"] < at - _SLOPE and oldest < number:
-            oldest += 1
+    before: deque[tuple[float, float]] = deque()
+    for at, one in steady(((one["time"], one) for one in values), remarks):
+        height = one["height"] - ground
+        before.append((at, height))
+        while before[0][0] < at - _SLOPE and len(before) > 1:
+            before.popleft()
         speed = one.get("vertical_speed", math.nan)
-        span = at - values[oldest]["time"]
+        span = at - before[0][0]
         if math.isnan(speed) and span > 0.0:
-            speed = (one["height"] - values[oldest]["height"]) / span
+            speed = (height - before[0][1]) / span
         if at - beat_at >= 1.0:
             beat_at = at
             out.add_change(at, beat)
@@ -204,7 +208,7 @@ def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tup
         )
         if math.isfinite(one.get("pressure", math.nan)):
             out.add(at, told.pressure(one["pressure"]))
-    return out.in_order(remarks)
+    return out.in_order()
 
 
 def _number(row: Sequence[str], place: int, factor: float) -> float:

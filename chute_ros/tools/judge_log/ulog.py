@@ -21,6 +21,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import angles_of, quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.judge_log.stamps import steady
 
 FORMAT = "PX4 ULog"
 MAGIC = b"ULog\x01\x12\x35"
@@ -30,6 +31,8 @@ _US = 1e-6
 _GAP = 0.05
 #: vehicle_status.arming_state.
 _ARMED = 2
+#: Among so many stamps of a topic a damaged one is seen.
+_OFTEN = 5
 _TOPICS = [
     *("vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_local_position"),
     *("vehicle_local_position_setpoint", "vehicle_global_position", "home_position"),
@@ -72,6 +75,7 @@ class _Teller:
 
     def __init__(self, ulog: Any) -> None:
         self._ulog, self._out = ulog, MessageLog()
+        self._remarks: list[str] = []
         self._parameters = {name: _plain(v) for name, v in ulog.initial_parameters.items()}
 
     def log(self, path: Path) -> FlightLog:
@@ -82,8 +86,7 @@ class _Teller:
         self._accelerations()
         self._batteries()
         vehicle_type = self._states()
-        remarks: list[str] = []
-        messages = self._out.in_order(remarks)
+        messages = list(steady(self._out.in_order(), self._remarks))
         return FlightLog(
             path,
             FORMAT,
@@ -91,7 +94,7 @@ class _Teller:
             dialect.MAV_AUTOPILOT_PX4,
             messages,
             self._parameters,
-            remarks=remarks,
+            remarks=self._remarks,
         )
 
     def _rows(self, topic: str, which: int = 0) -> Iterator[Row]:
@@ -100,9 +103,16 @@ class _Teller:
             if data.name == topic and data.multi_id == which:
                 names = [name for name in data.data if name != "timestamp"]
                 columns = [data.data[name].tolist() for name in names]
-                times = data.data["timestamp"].tolist()
+                times = self._times(data.data["timestamp"].tolist())
                 for time, *values in zip(times, *columns, strict=True):
-                    yield time * _US, dict(zip(names, values, strict=True))
+                    yield time, dict(zip(names, values, strict=True))
+
+    def _times(self, stamps: list[int]) -> list[float]:
+        """s. Nobody sets this clock, and a topic may rest for as long as nothing changes."""
+        times = [(stamp * _US, None) for stamp in stamps]
+        if len(times) >= _OFTEN:
+            times = list(steady(times, self._remarks, math.inf))
+        return [at for at, _ in times]
 
     def _attitudes(self) -> None:
         for at, row in self._rows("vehicle_attitude"):
@@ -121,8 +131,8 @@ class _Teller:
 
     def _positions(self) -> None:
         global_rows = list(self._rows("vehicle_global_position"))
-        home = next(iter(self._rows("home_position")), (0.0, {}))[1]
         homes = list(self._rows("home_position"))
+        home = homes[0][1] if homes else {}
         for at, row in homes:
             self._out.add_change(
                 at, told.home(row["alt"], row["lat"], row["lon"], row.get("z", 0.0))
