@@ -13,7 +13,7 @@ import numpy as np
 from chute_msgs.msg import VehicleState
 from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -245,21 +245,28 @@ def _topics(told: Iterable[Told]) -> Iterable[tuple[float, str, tuple[Any, ...]]
 # -- ROS --------------------------------------------------------------------------------------
 
 
-def mavros(told: Iterable[Told], path: Path) -> Path:
-    """A rosbag2 folder with what MAVROS publishes in types of ROS itself."""
+def mavros(
+    told: Iterable[Told],
+    path: Path,
+    others: Iterable[tuple[str, str, tuple[Any, ...]]] = (),
+    storage: StoragePlugin = StoragePlugin.SQLITE3,
+) -> Path:
+    """A rosbag2 folder with what MAVROS publishes in types of ROS itself. others: what is published
+    besides, before each position: topic, type, values."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = {
         "/mavros/global_position/rel_alt": "std_msgs/msg/Float64",
         "/mavros/local_position/velocity_local": "geometry_msgs/msg/TwistStamped",
         "/mavros/imu/data": "sensor_msgs/msg/Imu",
         "/mavros/imu/static_pressure": "sensor_msgs/msg/FluidPressure",
+        **{topic: kind for topic, kind, _ in others},
     }
     made = {name: store.types[name] for name in {*types.values(), *_PARTS}}
     header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
     vector, quaternion = made["geometry_msgs/msg/Vector3"], made["geometry_msgs/msg/Quaternion"]
     still, none = vector(0.0, 0.0, 0.0), np.zeros(9)
     turned = quaternion(0.0, 0.0, 0.0, 1.0)
-    with Writer(path, version=9) as writer:
+    with Writer(path, version=9, storage_plugin=storage) as writer:
         ways = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in types.items()}
 
         def say(topic: str, at: float, *values: Any) -> None:
@@ -271,6 +278,8 @@ def mavros(told: Iterable[Told], path: Path) -> Path:
             message, kind = one.message, one.message.get_type()
             if kind == "GLOBAL_POSITION_INT":
                 up = vector(0.0, 0.0, message.vz / -100.0)
+                for topic, _, values in others:
+                    say(topic, one.at, *values)
                 twist = made["geometry_msgs/msg/Twist"](up, still)
                 say("/mavros/local_position/velocity_local", one.at, header, twist)
                 say("/mavros/global_position/rel_alt", one.at, message.relative_alt / 1e3)

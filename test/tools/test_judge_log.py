@@ -16,8 +16,19 @@ import pytest
 from command_bench import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from log_bench import FAILS, FAILS_AT, FORMATS, HEIGHT, LANDED_AT, LANDS, Told, dataflash, flown
-from rosbags.rosbag2 import Writer
+from log_bench import (
+    FAILS,
+    FAILS_AT,
+    FORMATS,
+    HEIGHT,
+    LANDED_AT,
+    LANDS,
+    Told,
+    dataflash,
+    flown,
+    mavros,
+)
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from chute_ros.model import VTOL, Action
@@ -246,6 +257,26 @@ def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
         writer.write(topic, 10**9, store.serialize_cdr(store.types[kind](21.0), kind))
     with pytest.raises(LogError, match="no topic tells a height"):
         formats.read(tmp_path / "other", {})
+
+
+STRANGERS = [
+    ("/planner/state", "std_msgs/msg/String", ("IDLE",)),
+    ("/lidar/altitude", "std_msgs/msg/Float64", (1.5,)),
+    ("/gripper/battery", "std_msgs/msg/Float32", (12.0,)),
+    ("/zed/local_position/odom", "std_msgs/msg/Float32", (12.0,)),
+    ("/other/global_position/rel_alt", "std_msgs/msg/Float64", (math.nan,)),
+]
+
+
+@pytest.mark.parametrize("storage", StoragePlugin)
+def test_topics_of_another_program_change_nothing(storage, fallen, tmp_path):
+    """Given topics that end as those of MAVROS do, of other types, or without a number."""
+    alone = mavros(fallen, tmp_path / "alone", storage=storage)
+    beside = mavros(fallen, tmp_path / "beside", STRANGERS, storage)
+    (file,) = beside.glob(f"*.{'mcap' if storage is StoragePlugin.MCAP else 'db3'}")
+    log = formats.read(file, {})
+    assert numbers(log) == numbers(formats.read(alone, {}))
+    assert log.remarks == ["nothing tells when it was armed: taken to be armed throughout"]
 
 
 def test_a_fifo_is_not_waited_for(tmp_path):

@@ -33,22 +33,32 @@ _SILENCE = 10.0
 #: Of times by their ages, s.
 _ROUNDING = 0.005
 _SUITE, _TARGET = "vehicle/state", "setpoint_raw/target_attitude"
-#: How a topic of MAVROS ends -> what a message of it tells.
-_READERS: dict[str, Callable[[Any], readings.Parts]] = {
-    "global_position/rel_alt": readings.relative_altitude,
-    "altitude": lambda message: {"height": (message.relative,)},
-    "local_position/odom": readings.odometry,
-    "local_position/pose": lambda message: {"height": (message.pose.position.z,)},
-    "local_position/velocity_local": lambda message: {"vertical_speed": (message.twist.linear.z,)},
-    "global_position/global": readings.position,
-    "imu/data": readings.imu,
-    "imu/static_pressure": lambda message: {"pressure": (message.fluid_pressure,)},
-    "battery": readings.battery,
-    "extended_state": readings.mavros_extended_state,
-    "state": readings.mavros_state,
+#: How a topic of MAVROS ends, and its type -> what a message of it tells.
+_READERS: dict[tuple[str, str], Callable[[Any], readings.Parts]] = {
+    ("global_position/rel_alt", "std_msgs/msg/Float64"): readings.relative_altitude,
+    ("altitude", "mavros_msgs/msg/Altitude"): lambda message: {"height": (message.relative,)},
+    ("local_position/odom", "nav_msgs/msg/Odometry"): readings.odometry,
+    ("local_position/pose", "geometry_msgs/msg/PoseStamped"): lambda message: {
+        "height": (message.pose.position.z,)
+    },
+    ("local_position/velocity_local", "geometry_msgs/msg/TwistStamped"): lambda message: {
+        "vertical_speed": (message.twist.linear.z,)
+    },
+    ("global_position/global", "sensor_msgs/msg/NavSatFix"): readings.position,
+    ("imu/data", "sensor_msgs/msg/Imu"): readings.imu,
+    ("imu/static_pressure", "sensor_msgs/msg/FluidPressure"): lambda message: {
+        "pressure": (message.fluid_pressure,)
+    },
+    ("battery", "sensor_msgs/msg/BatteryState"): readings.battery,
+    ("extended_state", "mavros_msgs/msg/ExtendedState"): readings.mavros_extended_state,
+    ("state", "mavros_msgs/msg/State"): readings.mavros_state,
 }
-#: Topics that end as one of these does.
-_OTHERS = ("/safety/state", "/parachute/state")
+_KINDS = (
+    (_SUITE, "chute_msgs/msg/VehicleState"),
+    (_TARGET, "mavros_msgs/msg/AttitudeTarget"),
+    *_READERS,
+)
+_Kind = tuple[str, str]
 
 
 def read(path: Path) -> FlightLog:
@@ -67,17 +77,16 @@ def read(path: Path) -> FlightLog:
         return _of_mcap(path, teller)
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
-            chosen = [one for one in reader.connections if _end_of(one.topic)]
+            chosen = [one for one in reader.connections if _kind_of(one.topic, one.msgtype)]
             # Of none of them it would give all.
             every = reader.messages(connections=chosen) if chosen else ()
             stamped = ((time * _NANO, (connection, raw)) for connection, time, raw in every)
             for at, (connection, raw) in steady(stamped, teller.remarks, _SILENCE):
                 try:
                     message = reader.deserialize(raw, connection.msgtype)
-                except (KeyError, TypesysError):
+                    teller.take(connection.topic, connection.msgtype, message, at)
+                except (KeyError, AttributeError, TypesysError):
                     teller.unknown.add(connection.msgtype)
-                    continue
-                teller.take(_end_of(connection.topic), message, at)
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes of its reader
         raise LogError(f"{path}: no recording of ROS that can be read: {reason(error)}") from None
     return teller.log(path)
@@ -87,7 +96,7 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
     """By our own reader, which takes what a power cut has left, as of a black box."""
     entries = McapEntries(path)
     try:
-        chosen = [one for one in entries if _end_of(one.channel.topic)]
+        chosen = [one for one in entries if _kind_of(one.channel.topic, one.schema.name)]
     except RecordError as error:
         raise LogError(f"no recording of ROS that can be read: {error}") from None
     definitions: dict[int, Any] = {}
@@ -98,10 +107,9 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
             definitions[schema.id] = _definition(schema)
         try:
             message = definitions[schema.id].deserialize_cdr(entry.data, schema.name)
+            teller.take(entry.channel.topic, schema.name, message, at)
         except Exception:  # noqa: BLE001 - whatever damage makes of its reader
             teller.unknown.add(schema.name)
-            continue
-        teller.take(_end_of(entry.channel.topic), message, at)
     log = teller.log(path)
     log.remarks.extend(entries.remarks)
     return log
@@ -125,13 +133,10 @@ def _definition(schema: Schema) -> Any:
     return store if schema.name in store.fielddefs else get_typestore(Stores.ROS2_JAZZY)
 
 
-def _end_of(topic: str) -> str:
-    """How a topic ends that says something of the vehicle; empty: it does not."""
-    if topic.endswith(_OTHERS):
-        return ""
-    # MAVROS has a topic `state`, beside which `vehicle/state` is another.
-    ends = (_SUITE, _TARGET, *_READERS)
-    return next((end for end in ends if topic.endswith(f"/{end}")), "")
+def _kind_of(topic: str, message_type: str) -> _Kind | None:
+    """What a topic says of the vehicle; None: nothing, or it is another program's."""
+    kinds = (one for one in _KINDS if one[1] == message_type)
+    return next((one for one in kinds if f"/{topic}".endswith(f"/{one[0]}")), None)
 
 
 class _Teller:
@@ -150,20 +155,29 @@ class _Teller:
         #: Of VehicleState: part -> when the newest value was measured.
         self._measured: dict[str, float] = {}
 
-    def take(self, end: str, message: Any, at: float) -> None:
-        """One message of a topic that ends so, received at (s)."""
-        if end == _TARGET:
+    def take(self, topic: str, message_type: str, message: Any, at: float) -> None:
+        """One message of a topic, received at (s)."""
+        kind = _kind_of(topic, message_type)
+        if kind is None:
+            return
+        if kind[0] == _TARGET:
             self._target(message, at)
             return
-        parts = self._of_suite(message, at) if end == _SUITE else _READERS[end](message)
+        parts = self._of_suite(message, at) if kind[0] == _SUITE else _READERS[kind](message)
         new = {
             part: values
             for part, values in parts.items()
-            if values is not None and self._from.setdefault(part, end) == end
+            if values is not None and self._is_of(topic, part, values)
         }
         self._newest |= new
         for part in new:
             self._tell(part, at)
+
+    def _is_of(self, topic: str, part: str, values: readings.Values) -> bool:
+        """This topic tells this part: it was the first with a number."""
+        if part not in self._from and any(map(math.isfinite, values)):
+            self._from[part] = topic
+        return self._from.get(part) == topic
 
     def log(self, path: Path) -> FlightLog:
         """All of it; LogError: nothing of a vehicle."""
