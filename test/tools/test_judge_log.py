@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_bench import refused
@@ -32,7 +33,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from chute_ros.model import VTOL, Action
-from chute_ros.tools.judge_log import command, formats, table
+from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.tools.judge_log import command, formats, table, told
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged
@@ -65,7 +67,7 @@ def judged(path: Path, profile: str | None = None) -> Judged:
 def fell(fallen: list[Told], tmp_path_factory) -> Callable[[str], Judged]:
     """fell(name of a format): the flight whose motor fails, judged by that log."""
     folder = tmp_path_factory.mktemp("fell")
-    return functools.cache(lambda name: judged(FORMATS[name](fallen, folder / name)))
+    return cache(lambda name: judged(FORMATS[name](fallen, folder / name)))
 
 
 def highest(one: Judged) -> float:
@@ -184,6 +186,49 @@ def test_what_is_no_log_is_refused(name, text, says, tmp_path):
         formats.read(path, {})
     assert says in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [1e300, -1e300, 1e42, math.inf, math.nan])
+def test_a_number_that_no_wire_carries_counts_as_not_told(number):
+    """Given one such number after the other in each message that a log becomes."""
+    encoder = FrameEncoder(1, 1)
+    makers: list[tuple[Callable[..., Any], list[Any]]] = [
+        (told.attitude, [0.1, 0.2, 0.3]),
+        (told.position, [5.0, 1.0, 400.0, 47.0, 8.0]),
+        (told.pressure, [101_325.0]),
+        (partial(told.acceleration, 0), [0.0, 0.0, -9.8]),
+        (told.battery, [15.0, 0.5]),
+        (lambda *five: told.attitude_target(five[:4], five[4]), [1.0, 0.0, 0.0, 0.0, 0.5]),
+        (told.position_target, [5.0, 1.0]),
+        (told.local_position, [5.0, 1.0]),
+        (told.wing_target, [0.1, 0.2, 3.0]),
+        (told.home, [400.0, 47.0, 8.0, 0.0]),
+    ]
+    for make, right in makers:
+        for place in range(len(right)):
+            message = make(*[number if k == place else one for k, one in enumerate(right)])
+            assert message is None or encoder.encode(message, 0.0)
+    assert told.position(number, 1.0, 400.0, 47.0, 8.0) is None, "it would have no height"
+    assert told.acceleration(0, math.nan, 0.0, 0.0) is None, "that would be a free fall"
+    assert told.position(5.0, 1.0, 400.0, number, 8.0).relative_alt == 5000
+    assert told.home(400.0, number, 8.0, 0.0).altitude == 400_000
+
+
+def test_a_log_that_cannot_be_judged_keeps_no_other_from_it(landed, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    bad, good = begun(landed, tmp_path), tmp_path / "good.tlog"
+    good.write_bytes(bad.read_bytes())
+    fly = command.fly
+
+    def fails(log: FlightLog, *arguments: Any) -> Judged:
+        if log.path == bad:
+            raise OverflowError("a number")
+        return fly(log, *arguments)
+
+    monkeypatch.setattr(command, "fly", fails)
+    _, errors = refused(command, monkeypatch, capsys, str(bad), str(good))
+    assert errors.strip() == f"judge_log: {bad}: it cannot be judged: a number"
+    assert "good.tlog" in (tmp_path / "judged.html").read_text()
 
 
 # -- rockets -----------------------------------------------------------------------------------
@@ -310,8 +355,8 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
     one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
     assert "ATTITUDE has never come" not in "".join(text for _, text in one.said)
     assert one.flew > LANDED_AT - 5.0
-    told = {part.name: part for part in unknown(one)}
-    assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
+    missing = {part.name: part for part in unknown(one)}
+    assert (missing["tilt_deg"].share, missing["tilt_deg"].why) == (1.0, "never received")
     tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")
     assert tilt.blind > 0.9
 
@@ -319,8 +364,8 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
 def test_a_rule_that_waits_for_nothing_is_told_without_a_counter(fell):
     """`parachute open` has no `for`: its counter has no highest, which was told as nan s."""
     one = fell("flight.tlog")
-    told = {rating.told.name: rating.told for rating in ratings(one)}
-    first = told[one.fired[0][1].rule]
+    rules = {rating.told.name: rating.told for rating in ratings(one)}
+    first = rules[one.fired[0][1].rule]
     assert command._came(replace(first, hold=0.0)) == (
         f"{first.name} fulfilled, {first.fulfilled_at:.1f} s"
     )

@@ -20,7 +20,7 @@ from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.tools.judge_log import formats, known, table
 from chute_ros.tools.judge_log.findings import Verdict, verdict_of
-from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
+from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, reason
 from chute_ros.tools.judge_log.log_flight import Judged, fly
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
@@ -50,13 +50,11 @@ def main() -> None:
         for path in given.files:
             try:
                 log = formats.read(path, columns)
+                one, verdict, tried = _judged(log, config_of(log, given.profile), given.sweep)
             except LogError as error:
                 unread.append((path, error))
                 complain("judge_log", error)
                 continue
-            one = flown(log, config_of(log, given.profile))
-            tried = sweep(one) if given.sweep else []
-            verdict = verdict_of(one)
             _tell(verdict, one, tried)
             # What was seen of a flight takes a hundred times as much memory.
             flights.append((verdict, flight_section(len(flights), verdict, one, tried)))
@@ -74,6 +72,17 @@ def main() -> None:
     sys.exit(
         FIRED if any(verdict.ended for verdict, _ in flights) else UNREADABLE if unread else CLEAN
     )
+
+
+def _judged(
+    log: FlightLog, config: SupervisorConfig, sweeps: bool
+) -> tuple[Judged, Verdict, list[Tried]]:
+    """LogError: it cannot be flown. The other logs are judged all the same."""
+    try:
+        one = flown(log, config)
+        return one, verdict_of(one), sweep(one) if sweeps else []
+    except Exception as error:  # noqa: BLE001 - whatever the numbers of a log make of it
+        raise LogError(f"{log.path}: it cannot be judged: {reason(error)}") from None
 
 
 def _options() -> argparse.ArgumentParser:

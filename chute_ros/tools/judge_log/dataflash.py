@@ -213,6 +213,8 @@ class _Teller:
             return
         thrust = self._thrust()
         yaw = math.radians(getattr(entry, "DesYaw", math.degrees(angles[2])))
+        if not math.isfinite(yaw):
+            return
         turned = quaternion_of(roll, pitch, yaw)
         self._out.add(self._at, told.attitude_target(turned, thrust))
 
@@ -305,6 +307,8 @@ class _Teller:
     def parameter(self, entry: Any) -> None:
         """One of the autopilot's."""
         value = float(entry.Value)
+        if not told.can_be_single(value):
+            return
         self._parameters[entry.Name] = int(value) if value.is_integer() else value
 
     # -- what was told as it changed -------------------------------------------------------------

@@ -66,7 +66,9 @@ class MessageLog:
 
     def add(self, at: float, message: Any, which: Any = None) -> None:
         """which: of several of a kind. What comes sooner after the one before than any link
-        carries it is left out."""
+        carries it is left out; message None: nothing was told."""
+        if message is None:
+            return
         key = (message.get_msgId(), which)
         # A hundredth of a step: times are rounded.
         if math.isfinite(at) and at - self._newest.get(key, -math.inf) >= _APART * 0.99:
@@ -74,8 +76,8 @@ class MessageLog:
             self._messages.append((at, message))
 
     def add_change(self, at: float, message: Any) -> None:
-        """A message that is never left out."""
-        if math.isfinite(at):
+        """A message that is left out only if it is None."""
+        if message is not None and math.isfinite(at):
             self._messages.append((at, message))
 
     def seconds(self) -> list[float]:

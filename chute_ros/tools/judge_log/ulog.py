@@ -124,7 +124,10 @@ class _Teller:
                 turned = [row[f"q_d[{k}]"] for k in range(4)]
             else:
                 names = ("roll_body", "pitch_body", "yaw_body")
-                turned = list(quaternion_of(*(row.get(n, math.nan) for n in names)))
+                angles = [row.get(name, math.nan) for name in names]
+                if not all(map(math.isfinite, angles)):
+                    continue
+                turned = list(quaternion_of(*angles))
             thrust = row.get("thrust", -row.get("thrust_body[2]", math.nan))
             if all(map(math.isfinite, turned)):
                 self._out.add(at, told.attitude_target(turned, thrust))
@@ -186,7 +189,8 @@ class _Teller:
             self._out.add(at, told.battery(voltage, row.get("remaining", math.nan)))
 
     def _states(self) -> int:
-        vehicle_type = int(self._parameters.get("MAV_TYPE", dialect.MAV_TYPE_QUADROTOR))
+        told_type = self._parameters.get("MAV_TYPE", math.nan)
+        vehicle_type = int(told_type) if 0 <= told_type <= 255 else dialect.MAV_TYPE_QUADROTOR
         arming, flying = [], []
         for at, row in self._rows("vehicle_status"):
             vehicle_type = int(row.get("system_type", vehicle_type)) or vehicle_type
