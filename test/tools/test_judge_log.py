@@ -288,6 +288,52 @@ def test_a_unit_that_is_not_known_is_not_guessed(tmp_path):
     assert log.remarks == ["height from 'height (furlong)', time from 'time'"]
 
 
+@pytest.mark.parametrize(
+    ("headings", "used"),
+    [
+        (("time_s", "altitude_m", "velocity_ms"), None),
+        (("Time (s)", "Altitude (m)", "Vertical velocity (ms)"), None),
+        (("time", "altitude", "speed (m)"), None),
+        (("time", "altitude", "speed_s"), None),
+        (("time", "altitude", "velocity_fps"), "velocity_fps"),
+        (("time_m", "altitude_m", "speed"), "no column for time and height"),
+        (("time (ft)", "altitude", "speed"), "no column for time and height"),
+        (("time", "altitude_s", "speed"), "no column for time and height"),
+        (("time", "altitude_ms", "speed"), "no column for time and height"),
+    ],
+)
+def test_a_unit_of_another_quantity_is_not_known(headings, used, tmp_path):
+    """Given a speed in ms, which is no speed: the heights tell it."""
+    path = tmp_path / "rocket.csv"
+    rows = [",".join(headings), *(f"{k / 10},{k},3" for k in range(100))]
+    path.write_text("\n".join(rows))
+    if used == "no column for time and height":
+        with pytest.raises(LogError, match=used):
+            formats.read(path, {})
+        return
+    (remark,) = formats.read(path, {}).remarks
+    assert ("vertical_speed" in remark) is bool(used)
+    assert used is None or f"vertical_speed from {used!r}" in remark
+
+
+@pytest.mark.parametrize(
+    ("heading", "apart", "is_read"),
+    [("time", 50, False), ("time", 5, True), ("time (s)", 50, True), ("time (ms)", 50, True)],
+)
+def test_times_without_a_unit_are_seconds_only_if_rows_come_as_often(
+    heading, apart, is_read, tmp_path
+):
+    """Given an altimeter that writes milliseconds at 20 Hz, or one that writes every 5 s."""
+    path = tmp_path / "rocket.csv"
+    rows = "".join(f"{k * apart},{k}\n" for k in range(100))
+    path.write_text(f"{heading},height\n{rows}")
+    if is_read:
+        assert formats.read(path, {}).messages
+        return
+    with pytest.raises(LogError, match=r"its rows are 50 s apart: if 'time' is in other units"):
+        formats.read(path, {})
+
+
 def test_a_heading_that_was_given_and_is_not_there_is_not_replaced_by_another(tmp_path):
     path = tmp_path / "rocket.csv"
     path.write_text(rocket(25.0, "time", "height", 1.0))
