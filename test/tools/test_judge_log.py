@@ -428,12 +428,24 @@ def swept(fell) -> tuple[Judged, list[Tried]]:
 
 
 def test_a_sweep_tells_which_threshold_would_have_kept_it_clean(swept):
+    """Clean is a threshold with which nothing ends the whole log, by whatever rule."""
     one, tried = swept
     rule = next(r for r in one.config.profile.rules if r.name == one.fired[0][1].rule)
     assert {t.rule for t in tried} == {rule.name}
     hold = next(t for t in tried if t.what == "for (s)")
     assert hold.shipped == rule.hold
     assert not hold.clean <= hold.shipped
+    for t in tried:
+        assert math.isnan(t.clean) is bool(t.ended), t
+
+
+def test_a_fall_that_another_rule_ends_is_not_called_clean(swept):
+    """Given a fall that every rule sees, it lands hard whatever one of them waits for."""
+    _, tried = swept
+    hold = next(t for t in tried if t.what == "for (s)")
+    assert math.isnan(hold.clean)
+    assert " at " in hold.ended
+    assert hold.furthest == pytest.approx(3.0 * hold.shipped)
 
 
 def test_the_page_has_every_log_and_nothing_of_it_raw(swept, tmp_path):
@@ -446,7 +458,7 @@ def test_the_page_has_every_log_and_nothing_of_it_raw(swept, tmp_path):
     assert text.startswith("<!DOCTYPE html>")
     for raw in ("<script>", "<b>remark", "<i>", "<u>", "\x1b"):
         assert raw not in text
-    for part in ("KILL at", "Decisions", "How near each rule came", "not known", "clean from"):
+    for part in ("KILL at", "Decisions", "How near each rule came", "not known", "further out"):
         assert part in text
 
 

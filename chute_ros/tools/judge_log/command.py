@@ -194,8 +194,7 @@ def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
         lines.append(f"  rules blind for a share of the flight: {shares}")
     lines += [f"  note: {text}" for text in log.remarks]
     for t in tried:
-        clean = f"clean from {t.clean:.3g}" if t.clean == t.clean else "not clean with any tried"
-        lines.append(f"  sweep: {t.rule}: {t.what} is {t.shipped:g}, {clean}")
+        lines.append(f"  sweep: {t.rule}: {t.what} is {t.shipped:g}, {t.words}")
     print("\n".join(map(plain, lines)), flush=True)
 
 

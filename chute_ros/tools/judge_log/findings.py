@@ -96,10 +96,13 @@ def verdict_of(judged: Judged) -> Verdict:
 
 def _words(judged: Judged) -> str:
     if judged.fired:
-        return ", ".join(
-            f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
-        )
+        return fired_words(judged)
     return "nothing ended the flight" if judged.flew else "never in flight"
+
+
+def fired_words(judged: Judged) -> str:
+    """What ended it, and when; empty: nothing did."""
+    return ", ".join(f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired)
 
 
 def height_at(judged: Judged, at: float) -> float:

@@ -174,13 +174,13 @@ def _unknown(one: Judged, unknown: Sequence[Unknown]) -> str:
 
 def _tried(tried: Sequence[Tried]) -> str:
     return table(
-        ("rule", "threshold", "shipped", "clean from"),
+        ("rule", "threshold", "shipped", "further out"),
         (
             (
                 cell(escaped(t.rule)),
                 cell(escaped(t.what)),
                 number(f"{t.shipped:g}"),
-                number(f"{t.clean:.3g}" if t.clean == t.clean else "none of those tried"),
+                words(escaped(t.words)),
             )
             for t in tried
         ),
