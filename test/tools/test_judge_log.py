@@ -162,6 +162,20 @@ def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
     assert [one.action for _, one in judged(path).fired][:1] == [Action.KILL]
 
 
+@pytest.mark.parametrize(("middle", "tail"), [(5000, 0), (0, 5000), (300, 300), (0, 0)])
+def test_damage_of_a_binary_log_is_told_in_a_line(middle, tail, landed, tmp_path, capfd):
+    """Given zeros between two entries, and behind the last one, where a few are no damage. A part
+    of its reader writes past Python, to the terminal itself."""
+    path = dataflash(landed, tmp_path / "flight.bin")
+    whole = path.read_bytes()
+    place = whole.index(b"\xa3\x95\x81", len(whole) // 2)
+    path.write_bytes(whole[:place] + bytes(middle) + whole[place:] + bytes(tail))
+    log = formats.read(path, {})
+    damaged = middle + (tail if tail > 528 else 0)
+    assert log.remarks == [f"{damaged} damaged bytes were passed over"] * bool(damaged)
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import bisect
 import contextlib
-import io
 import math
+import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -47,6 +48,9 @@ _READ = frozenset(
         *("STAT", "ORGN", "PARM", "MSG", "VER", "XKF1", "NKF1", "EKF1", *_IMUS),
     }
 )
+#: Logs in flash memory end with so many bytes of filling at most.
+_PAGE = 528
+_STDERR = 2
 #: What pymavlink makes of a log without any clock.
 _TIMELESS = "unsupported operand type(s) for *: 'int' and 'NoneType'"
 #: How the firmwares name themselves.
@@ -60,10 +64,8 @@ _NAMES = {
 
 def read(path: Path) -> FlightLog:
     """The log of this file; LogError if it is none."""
-    noise = io.StringIO()
     try:
-        # It writes of each damaged message.
-        with contextlib.redirect_stderr(noise), contextlib.redirect_stdout(noise):
+        with _silence():
             log = _read(path)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
@@ -74,10 +76,25 @@ def read(path: Path) -> FlightLog:
         raise LogError(f"{path}: no log of ArduPilot that can be read: {why}") from None
     if not log.messages:
         raise LogError(f"{path}: no log of ArduPilot: nothing of a vehicle is in it")
-    damaged = noise.getvalue().count("\n")
-    if damaged:
-        log.remarks.append(f"{damaged} damaged places were left out")
     return log
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """pymavlink writes of each damaged byte, its compiled part past sys.stderr."""
+    sys.stderr.flush()
+    stderr = os.dup(_STDERR)
+    try:
+        with (
+            open(os.devnull, "w") as nothing,
+            contextlib.redirect_stdout(nothing),
+            contextlib.redirect_stderr(nothing),
+        ):
+            os.dup2(nothing.fileno(), _STDERR)
+            yield
+    finally:
+        os.dup2(stderr, _STDERR)
+        os.close(stderr)
 
 
 def _read(path: Path) -> FlightLog:
@@ -106,18 +123,39 @@ def _told(path: Path, reader: Any, console: str) -> FlightLog:
     # It closes nothing itself.
     with reader.filehandle, reader.data_map:
         remarks: list[str] = []
-        for at, entry in steady(_stamped(reader, teller), remarks):
+        entries = _Entries(reader)
+        for at, entry in steady(entries.stamped(teller), remarks):
             teller.take(entry, at)
+        if damaged := entries.damaged:
+            remarks.append(f"{damaged} damaged bytes were passed over")
     return teller.log(path, remarks)
 
 
-def _stamped(reader: Any, teller: _Teller) -> Iterator[tuple[float, Any]]:
-    """Each entry of a moment with its own time (s); the parameters, which have none, are told."""
-    while (entry := reader.recv_msg()) is not None:
-        if entry.get_type() == "PARM":
-            teller.parameter(entry)
-        elif entry.get_type() in _READ:
-            yield entry._timestamp, entry
+class _Entries:
+    """What pymavlink makes of a file."""
+
+    def __init__(self, reader: Any) -> None:
+        self._reader = reader
+        self._read = self._end = 0
+
+    def stamped(self, teller: _Teller) -> Iterator[tuple[float, Any]]:
+        """Each entry of a moment with its own time (s); parameters, which have none, are told."""
+        while (entry := self._reader.recv_msg()) is not None:
+            self._read += entry.fmt.len
+            self._end = self._reader.offset
+            if entry.get_type() == "PARM":
+                teller.parameter(entry)
+            elif entry.get_type() in _READ:
+                yield entry._timestamp, entry
+
+    @property
+    def damaged(self) -> int:
+        """Bytes of a binary log that were no entry; what fills the last page is no damage."""
+        if not hasattr(self._reader, "HEAD1"):
+            return 0
+        size: int = self._reader.data_len
+        behind = size - self._end
+        return size - self._read - (behind if behind < _PAGE else 0)
 
 
 class _Teller:
