@@ -185,15 +185,19 @@ TOPICS = {
 _ULOG_TYPES = {"float": "f", "double": "d", "uint8_t": "B", "bool": "?"}
 
 
-def ulog(told: Iterable[Told], path: Path) -> Path:
-    """As PX4 writes it."""
+def ulog(told: Iterable[Told], path: Path, home_z: float | None = None, valid_alt: bool = True) -> Path:
+    """As PX4 writes it: without valid_alt as old ones do; with home_z as new ones do, for which
+    heights begin there; a home that is not valid is full of zeros."""
+    topics = dict(TOPICS)
+    if home_z is not None:
+        topics["home_position"] = [*TOPICS["home_position"], "bool valid_alt"]
     parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)]
 
     def message(kind: str, payload: bytes) -> None:
         parts.append(struct.pack("<HB", len(payload), ord(kind)) + payload)
 
     message("B", bytes(40))
-    for name, fields in TOPICS.items():
+    for name, fields in topics.items():
         message("F", f"{name}:uint64_t timestamp;{';'.join(fields)};".encode())
     key = b"int32_t MAV_TYPE"
     message("P", bytes([len(key)]) + key + struct.pack("<i", 2))
@@ -202,7 +206,9 @@ def ulog(told: Iterable[Told], path: Path) -> Path:
         message("A", struct.pack("<BH", 0, number) + name.encode())
     for at, name, values in _topics(told):
         form = "<HQ"
-        for field in TOPICS[name]:
+        if name == "home_position" and home_z is not None:
+            values = (*values[:3], home_z, True) if valid_alt else (0.0, 0.0, 0.0, 0.0, False)
+        for field in topics[name]:
             kind, _, length = field.split()[0].partition("[")
             form += f"{length.rstrip(']')}{_ULOG_TYPES[kind]}"
         message("D", struct.pack(form, numbers[name], round(at * 1e6), *values))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import math
 import os
 import subprocess
@@ -28,6 +29,7 @@ from log_bench import (
     dataflash,
     flown,
     mavros,
+    ulog,
 )
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -114,6 +116,34 @@ def test_the_attitude_and_the_force_are_those_of_the_flight(name, fell):
     before = [state for at, state in one.vehicle if FAILS_AT - 3.0 < at < FAILS_AT - 1.0]
     assert all(state.acceleration == pytest.approx(9.8, abs=0.5) for state in before)
     assert all(state.tilt < 0.05 for state in before)
+
+
+@pytest.mark.parametrize(
+    ("home", "higher"),
+    [
+        ({}, 0.0),
+        ({"home_z": 3.0}, 3.0),
+        ({"home_z": 3.0, "valid_alt": False}, 0.0),
+    ],
+)
+def test_a_height_of_px4_is_above_a_valid_home_or_the_origin(home, higher, landed, tmp_path):
+    """Given a home at the altitude of the take-off, one 3 m below the origin, and one that is not
+    valid, whose altitude is 0: heights were by 488 m higher."""
+    raised = [replace(one, message=_raised(one.message)) for one in landed]
+    log = formats.read(ulog(raised, tmp_path / "flight.ulg", **home), {})
+    heights = [m.relative_alt / 1e3 for _, m in log.messages if hasattr(m, "relative_alt")]
+    assert max(heights) == pytest.approx(HEIGHT + higher, abs=0.5)
+    homes = [m.altitude for _, m in log.messages if m.get_type() == "HOME_POSITION"]
+    assert bool(homes) is home.get("valid_alt", True)
+
+
+def _raised(message: Any) -> Any:
+    """Where the ground is 488 m high."""
+    if message.get_type() != "GLOBAL_POSITION_INT":
+        return message
+    higher = copy.copy(message)
+    higher.alt = message.alt + 488_000
+    return higher
 
 
 # -- what is damaged ---------------------------------------------------------------------------

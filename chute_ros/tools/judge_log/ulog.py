@@ -13,7 +13,7 @@ import contextlib
 import io
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -137,24 +137,22 @@ class _Teller:
         homes = list(self._rows("home_position"))
         home = homes[0][1] if homes else {}
         for at, row in homes:
+            if not row.get("valid_alt", True):
+                continue
             self._out.add_change(
                 at, told.home(row["alt"], row["lat"], row["lon"], row.get("z", 0.0))
             )
         times = [at for at, _ in global_rows]
         home_times = [at for at, _ in homes]
         for at, row in self._rows("vehicle_local_position"):
-            speed, height = -row["vz"], -row["z"]
-            self._out.add(at, told.local_position(height, speed))
+            speed = -row["vz"]
+            self._out.add(at, told.local_position(-row["z"], speed))
             number = bisect.bisect_right(times, at) - 1
-            if number < 0:
-                # Without a global position PX4 sends what it has: the height above its origin.
-                where, altitude = {}, math.nan
-            else:
-                where = global_rows[number][1]
-                altitude = where["alt"]
-                newest = bisect.bisect_right(home_times, at) - 1
-                base = homes[newest][1] if newest >= 0 else home
-                height = altitude - base["alt"] if base else height
+            # Without a global position PX4 sends what it has.
+            where = global_rows[number][1] if number >= 0 else {}
+            altitude = where.get("alt", math.nan)
+            newest = bisect.bisect_right(home_times, at) - 1
+            height = _height(row, altitude, homes[newest][1] if newest >= 0 else home)
             known = (where.get("lat", math.nan), where.get("lon", math.nan))
             self._out.add(at, told.position(height, speed, altitude, *known))
         for at, row in self._rows("vehicle_local_position_setpoint"):
@@ -203,6 +201,14 @@ class _Teller:
         for at, in_air in _changes(flying, self._out.seconds()):
             self._out.add_change(at, told.landed(in_air))
         return vehicle_type
+
+
+def _height(row: Mapping[str, float], altitude: float, home: Mapping[str, float]) -> float:
+    """Above home, if it is valid; otherwise above the origin. row: of the local position."""
+    if "valid_alt" in home:
+        return home["z"] - row["z"] if home["valid_alt"] else -row["z"]
+    # Older logs do not tell whether it is valid.
+    return altitude - home["alt"] if home and math.isfinite(altitude) else -row["z"]
 
 
 def _changes(told_of: list[tuple[float, bool]], moments: list[float]) -> list[tuple[float, bool]]:
