@@ -36,6 +36,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from chute_ros.model import VTOL, Action
 from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools.judge_log import command, formats, table, told
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
@@ -560,6 +561,15 @@ def test_a_wrong_argument_is_refused(arguments, says, landed, tmp_path, monkeypa
     _, errors = refused(command, monkeypatch, capsys, log, *map(str, arguments))
     assert says in errors
     assert not (tmp_path / "judged.html").exists()
+
+
+@pytest.mark.parametrize("name", ["mine.yml", "mine.yaml"])
+def test_a_profile_of_ones_own_is_found_by_its_file(name, landed, tmp_path):
+    mine = tmp_path / "out" / name
+    mine.parent.mkdir()
+    mine.write_text((config_folder() / "profiles" / "rocket.yaml").read_text())
+    log = formats.read(begun(landed, tmp_path), {})
+    assert command.config_of(log, str(mine)).profile.name == "rocket"
 
 
 def test_a_wrong_argument_ends_it_in_a_line(landed, tmp_path):

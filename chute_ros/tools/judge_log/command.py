@@ -149,7 +149,7 @@ def config_of(log: FlightLog, profile: str | None) -> SupervisorConfig:
     name = profile or log.profile
     folder = config_folder() / "profiles"
     if name.endswith((".yaml", ".yml")) or "/" in name:
-        folder, name = Path(name).resolve().parent, Path(name).stem
+        folder, name = Path(name).resolve().parent, Path(name).name
     try:
         return Shipped(folder).config(_VEHICLE, name, False, 0)
     except UnicodeDecodeError as error:
