@@ -452,6 +452,18 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
     assert tilt.blind > 0.9
 
 
+def test_what_was_missing_to_be_in_flight_is_told(landed, tmp_path):
+    """Given a log with an attitude alone: nothing tells a take-off."""
+    kinds = ("HEARTBEAT", "ATTITUDE")
+    fewer = [one for one in landed if one.message.get_type() in kinds]
+    one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
+    verdict = verdict_of(one)
+    assert verdict.words == "never in flight"
+    missing = {part.name: part for part in verdict.unknown}
+    assert (missing["height"].share, missing["height"].why) == (1.0, "never received")
+    assert "it was never in flight: in the whole log" in flight_section(0, verdict, one, [])
+
+
 def test_a_rule_that_waits_for_nothing_is_told_without_a_counter(fell):
     """`parachute open` has no `for`: its counter has no highest, which was told as nan s."""
     one = fell("flight.tlog")

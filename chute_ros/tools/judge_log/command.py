@@ -175,7 +175,7 @@ def _came(rule: RuleTold) -> str:
 
 
 def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
-    log = one.log
+    log, span = one.log, "flight" if verdict.flew else "log"
     lines = [
         f"{log.path}: {log.format}, profile {one.config.profile.name}",
         f"  {log.duration:.0f} s, {verdict.flew:.0f} s in flight",
@@ -184,7 +184,7 @@ def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
     lines += [f"  nearest: {_came(one.told)}" for one in verdict.moved[:3]]
     lines += [
-        f"  not known: {u.name} for {100.0 * u.share:.0f} % of the flight ({u.why})"
+        f"  not known: {u.name} for {100.0 * u.share:.0f} % of the {span} ({u.why})"
         for u in verdict.unknown
         if u.share >= _TOLD
     ]

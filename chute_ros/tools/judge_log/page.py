@@ -76,7 +76,7 @@ def flight_section(place: int, verdict: Verdict, one: Judged, tried: Sequence[Tr
         _decisions(one),
         "<h3>How near each rule came</h3>",
         _ratings(verdict.ratings),
-        "<h3>What was not known in flight</h3>",
+        "<h3>What was not known</h3>",
         _unknown(one, verdict.unknown),
     ]
     if reasons := blocked(one):
@@ -161,10 +161,10 @@ def _ratings(ratings: Sequence[Rating]) -> str:
 
 
 def _unknown(one: Judged, unknown: Sequence[Unknown]) -> str:
-    if not any(p.state == Stage.IN_FLIGHT for _, p in one.pictures):
-        return '<p class="dim">it was never in flight</p>'
-    return table(
-        ("measurement", "share of the flight, %", "reason, the newest"),
+    flew = any(p.state == Stage.IN_FLIGHT for _, p in one.pictures)
+    never = "" if flew else '<p class="dim">it was never in flight: in the whole log</p>\n'
+    return never + table(
+        ("measurement", f"share of the {'flight' if flew else 'log'}, %", "reason, the newest"),
         (
             (cell(escaped(u.name)), number(f"{100.0 * u.share:.0f}"), words(escaped(u.why)))
             for u in unknown
