@@ -186,6 +186,26 @@ def test_a_damaged_log_is_read_or_refused_in_words(data, whole, tmp_path):
         assert formats.read(path, {}).messages
 
 
+@pytest.mark.parametrize("name", ["flight.tlog", "flight.bin", "flight.log"])
+def test_a_log_whose_first_bytes_are_damaged_is_known_by_its_name(name, fallen, tmp_path):
+    path = FORMATS[name](fallen, tmp_path / name)
+    path.write_bytes(b"\xff" * 20 + path.read_bytes()[20:])
+    assert [one.action for _, one in judged(path).fired][:1] == [Action.KILL]
+
+
+def test_an_mcap_is_known_by_its_first_bytes(fallen, tmp_path):
+    path = FORMATS["box.mcap"](fallen, tmp_path / "box.mcap")
+    box, other = formats.read(path, {}), path.rename(tmp_path / "box")
+    assert numbers(formats.read(other, {})) == numbers(box)
+
+
+def test_a_recording_that_was_cut_off_too_early_says_so(fallen, tmp_path):
+    path = FORMATS["box.mcap"](fallen, tmp_path / "box.mcap")
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(LogError, match=r"no topic tells a height.*ends in the middle"):
+        formats.read(path, {})
+
+
 @pytest.mark.parametrize("name", [one for one in FORMATS if "." in one])
 def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
     path = FORMATS[name](fallen, tmp_path / name)
@@ -212,7 +232,10 @@ def test_damage_of_a_binary_log_is_told_in_a_line(middle, tail, landed, tmp_path
     [
         ("empty.bin", b"", "it is empty"),
         ("notes.txt", b"the flight went well\n", "no log of a known format (ArduPilot's .bin"),
-        ("noise.tlog", bytes(range(256)) * 20, "no log of a known format"),
+        ("noise.dat", bytes(range(256)), "no log of a known format"),
+        ("noise.tlog", bytes(range(256)), "no heartbeat of an autopilot is in it"),
+        ("noise.bin", bytes(range(256)), "no log of ArduPilot"),
+        ("noise.mcap", bytes(range(256)), "no recording of ROS"),
         ("table.csv", b"a,b\n1,2\n", "no column for time and height; its first line has a, b"),
         ("table.csv", b"time,height\n1,x\n", "no flight: of 1 rows 0 have a number for time "),
         ("table.csv", b"time," + b"a" * 200_000 + b"\n1,2\n", "no table: field larger than"),

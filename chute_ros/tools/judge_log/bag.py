@@ -73,8 +73,6 @@ def read(path: Path) -> FlightLog:
         ) from None
     folder = path if path.suffix == ".bag" or path.is_dir() else path.parent
     teller = _Teller()
-    if path.suffix == ".mcap":
-        return _of_mcap(path, teller)
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _kind_of(one.topic, one.msgtype)]
@@ -92,8 +90,9 @@ def read(path: Path) -> FlightLog:
     return teller.log(path)
 
 
-def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
+def read_mcap(path: Path) -> FlightLog:
     """By our own reader, which takes what a power cut has left, as of a black box."""
+    teller = _Teller()
     entries = McapEntries(path)
     try:
         chosen = [one for one in entries if _kind_of(one.channel.topic, one.schema.name)]
@@ -110,9 +109,8 @@ def _of_mcap(path: Path, teller: _Teller) -> FlightLog:
             teller.take(entry.channel.topic, schema.name, message, at)
         except Exception:  # noqa: BLE001 - whatever damage makes of its reader
             teller.unknown.add(schema.name)
-    log = teller.log(path)
-    log.remarks.extend(entries.remarks)
-    return log
+    teller.remarks.extend(entries.remarks)
+    return teller.log(path)
 
 
 def _definition(schema: Schema) -> Any:
@@ -181,6 +179,7 @@ class _Teller:
 
     def log(self, path: Path) -> FlightLog:
         """All of it; LogError: nothing of a vehicle."""
+        damage = "".join(f"; {one}" for one in self.remarks)
         remarks = self.remarks
         if "armed" not in self._newest:
             remarks.append("nothing tells when it was armed: taken to be armed throughout")
@@ -192,7 +191,7 @@ class _Teller:
             wants = "vehicle/state, or mavros/global_position/rel_alt, altitude or local_position"
             types = ", ".join(sorted(self.unknown))
             lacking = f"; of these types it has no definition: {types}" if types else ""
-            raise LogError(f"{path}: no topic tells a height (need {wants}){lacking}")
+            raise LogError(f"{path}: no topic tells a height (need {wants}){lacking}{damage}")
         if self.unknown:
             remarks.append(f"without a definition: {', '.join(sorted(self.unknown))}")
         return FlightLog(

@@ -48,6 +48,8 @@ _READ = frozenset(
         *("STAT", "ORGN", "PARM", "MSG", "VER", "XKF1", "NKF1", "EKF1", *_IMUS),
     }
 )
+#: A text begins to tell what is in it within so many bytes.
+_HEAD = 4096
 #: Logs in flash memory end with so many bytes of filling at most.
 _PAGE = 528
 _STDERR = 2
@@ -102,8 +104,9 @@ def _read(path: Path) -> FlightLog:
     from pymavlink import DFReader
 
     with open_regular(path) as file:
-        binary = file.read(2) == MAGIC
-    if binary:
+        head = file.read(_HEAD)
+    # The first bytes may be damaged, and a text has lines of the console before its first entry.
+    if head.startswith(MAGIC) or b"FMT," not in head:
         return _told(path, DFReader.DFReader_binary(str(path)), "")
     # Text logs until 3.1 have lines of the console before the first entry.
     with open_regular(path) as file:
