@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from command_bench import assert_refused
 from log_bench import FAILS, FAILS_AT, FALLS_FROM, LANDED_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
@@ -71,8 +72,17 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
     assert 0.7 * FALLS_FROM < int(height) < FALLS_FROM
     assert "- none.bin: it is empty" in text
     assert "- well.tlog: some/repo: a/b.tlog" in text
-    with pytest.raises(ChuteError, match=r"no line for well\.tlog"):
-        page([landed], [], {})
+
+
+def test_a_log_of_which_nothing_is_known_is_told_before_any_is_judged(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    tlog(flown(LANDS, 3.0), tmp_path / "begun.tlog")
+    (tmp_path / "known.tsv").write_text(f"{HEAD}\nother.tlog\ty\tyes\tz\tflies\t\t\n")
+    arguments = ("begun.tlog", "--known", "known.tsv")
+    words = "--known has no line for begun.tlog"
+    assert_refused(command, monkeypatch, capsys, arguments, words)
 
 
 @pytest.mark.parametrize(

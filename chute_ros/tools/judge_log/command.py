@@ -47,6 +47,8 @@ def main() -> None:
         require_output(given.page, HTML, read_here)
         if given.known:
             require_output(given.table, MARKDOWN, read_here)
+            what_happened = known.known_of(given.known)
+            known.require_all(given.files, what_happened)
         for path in given.files:
             try:
                 log = formats.read(path, columns)
@@ -60,12 +62,12 @@ def main() -> None:
             flights.append((verdict, flight_section(len(flights), verdict, one, tried)))
         if flights:
             write_page(given.page, page(flights, unread), HTML, read_here)
-            print(f"page: {given.page}")
+            print(f"page: {plain(given.page)}")
         if given.known:
             verdicts = [verdict for verdict, _ in flights]
-            told = known.page(verdicts, unread, known.known_of(given.known))
+            told = known.page(verdicts, unread, what_happened)
             write_page(given.table, told, MARKDOWN, read_here)
-            print(f"table: {given.table}")
+            print(f"table: {plain(given.table)}")
     except ChuteError as error:
         complain("judge_log", error)
         sys.exit(UNREADABLE)
