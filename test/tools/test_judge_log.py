@@ -43,6 +43,7 @@ from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
+from chute_ros.tools.progress import Progress
 
 EACH = pytest.mark.parametrize("name", FORMATS)
 # Flights are flown and judged once for all.
@@ -574,6 +575,12 @@ def test_the_exit_code_tells_whether_anything_would_have_left(landed, fallen, tm
     assert "KILL at" in fired.stdout
     assert complaints(fired) == [f"judge_log: {tmp_path}/none.bin: No such file or directory"]
     assert run(tmp_path / "none.bin", "--page", html).returncode == 2
+
+
+def test_the_name_of_a_file_stays_on_its_line_of_progress(monkeypatch, capsys):
+    monkeypatch.setattr("chute_ros.tools.progress._EVERY", 0.0)
+    Progress("judging a\n\x1b[2J.bin", 2).at(1)
+    assert capsys.readouterr().err == "judging a\\n\\x1b[2J.bin: 50 %\n"
 
 
 def begun(landed: list[Told], folder: Path) -> Path:
