@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from log_bench import FAILS, FAILS_AT, FORMATS, Told, flown
+from log_bench import FAILS, FAILS_AT, FORMATS, Told, flown, mavros
+from rosbags.rosbag2 import StoragePlugin
 
 from chute_ros.tools.judge_log import command, formats
 from chute_ros.tools.judge_log.log_flight import Judged
@@ -91,8 +93,12 @@ def judged(path: Path) -> Judged:
 def ends(fallen, tmp_path_factory) -> Callable[[str], Judged]:
     """ends(name of a format): the flight with every time as it was."""
     folder = tmp_path_factory.mktemp("ends")
-    made = {name: judged(FORMATS[name](fallen, folder / name)) for name in TOUCHED}
+    made = {name: judged(WRITERS[name](fallen, folder / name)) for name in (*TOUCHED, *FOLDERS)}
     return made.__getitem__
+
+
+#: A folder with parts in MCAP as well.
+WRITERS = FORMATS | {"mavros.mcap": partial(mavros, storage=StoragePlugin.MCAP)}
 
 
 def is_ended_alike(one: Judged, other: Judged) -> bool:
@@ -103,6 +109,7 @@ def is_ended_alike(one: Judged, other: Judged) -> bool:
     return abs(at - rightly) <= 1.0 and abs(one.flew - other.flew) <= 2.0
 
 
+FOLDERS = ("mavros", "mavros.mcap")
 TOUCHED = ("flight.tlog", "flight.bin", "flight.log", "flight.ulg", "box.mcap")
 
 
@@ -126,9 +133,12 @@ def test_one_damaged_stamp_hides_no_fall(name, by, fallen, ends, tmp_path):
         ("flight.bin", HOUR),
         ("box.mcap", 40.0),
         ("box.mcap", HOUR),
+        ("mavros", -3.0),
+        ("mavros", -5.0),
+        ("mavros.mcap", -5.0),
     ],
 )
 def test_a_clock_that_is_set_in_flight_hides_no_fall(name, by, fallen, ends, tmp_path):
     told = [replace(one, at=one.at + by * (one.at > FAILS_AT - 6.0)) for one in fallen]
-    one = judged(FORMATS[name](told, tmp_path / name))
+    one = judged(WRITERS[name](told, tmp_path / name))
     assert is_ended_alike(one, ends(name)), one.fired

@@ -8,8 +8,9 @@ nodes listen to is read as they read it (protocol/vehicle_readings.py).
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,13 +72,15 @@ def read(path: Path) -> FlightLog:
         raise LogError(
             f"{path}: a recording of ROS needs the package rosbags: python3 -m pip install rosbags"
         ) from None
+    if path.is_dir() and (files := sorted(path.glob("*.mcap"), key=_number)):
+        return _of_mcaps(path, files)
     folder = path if path.suffix == ".bag" or path.is_dir() else path.parent
     teller = _Teller()
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _kind_of(one.topic, one.msgtype)]
             # Of none of them it would give all.
-            every = reader.messages(connections=chosen) if chosen else ()
+            every = _as_written(reader, chosen) if chosen else ()
             stamped = ((time * _NANO, (connection, raw)) for connection, time, raw in every)
             for at, (connection, raw) in steady(stamped, teller.remarks, _SILENCE):
                 try:
@@ -90,27 +93,64 @@ def read(path: Path) -> FlightLog:
     return teller.log(path)
 
 
+def _as_written(reader: Any, chosen: Sequence[Any]) -> Iterable[tuple[Any, int, Any]]:
+    """(connection, ns, message) in the order of the file, if it is a database: its times are of a
+    clock that may have been set."""
+    folders = [getattr(part, "storage", None) for part in reader.readers]
+    storages = [one for folder in folders for one in getattr(folder, "storages", [folder])]
+    databases = [one for one in storages if hasattr(one, "dbconn")]
+    if not databases or any(part.compression_mode == "message" for part in reader.readers):
+        yield from reader.messages(connections=chosen)
+        return
+    topics = {one.topic for one in chosen}
+    for database in databases:
+        connections = {one.id: one for one in database.connections if one.topic in topics}
+        rows = database.dbconn.execute(
+            "SELECT topic_id, timestamp, data FROM messages ORDER BY rowid"
+        )
+        for topic, time, raw in rows:
+            if topic in connections:
+                yield connections[topic], time, raw
+
+
 def read_mcap(path: Path) -> FlightLog:
-    """By our own reader, which takes what a power cut has left, as of a black box."""
+    """The log of one file."""
+    return _of_mcaps(path, [path])
+
+
+def _of_mcaps(path: Path, files: Sequence[Path]) -> FlightLog:
+    """By our own reader, which takes what a power cut has left, as of a black box. files: the
+    parts of this recording, the oldest first."""
     teller = _Teller()
-    entries = McapEntries(path)
+    parts = [McapEntries(file) for file in files]
     try:
-        chosen = [one for one in entries if _kind_of(one.channel.topic, one.schema.name)]
+        chosen = [
+            one
+            for one in itertools.chain.from_iterable(parts)
+            if _kind_of(one.channel.topic, one.schema.name)
+        ]
     except RecordError as error:
         raise LogError(f"no recording of ROS that can be read: {error}") from None
-    definitions: dict[int, Any] = {}
+    definitions: dict[tuple[str, bytes], Any] = {}
     stamped = ((one.time * _NANO, one) for one in chosen)
     for at, entry in steady(stamped, teller.remarks, _SILENCE):
         schema = entry.schema
-        if schema.id not in definitions:
-            definitions[schema.id] = _definition(schema)
+        key = (schema.name, schema.data)
+        if key not in definitions:
+            definitions[key] = _definition(schema)
         try:
-            message = definitions[schema.id].deserialize_cdr(entry.data, schema.name)
+            message = definitions[key].deserialize_cdr(entry.data, schema.name)
             teller.take(entry.channel.topic, schema.name, message, at)
         except Exception:  # noqa: BLE001 - whatever damage makes of its reader
             teller.unknown.add(schema.name)
-    teller.remarks.extend(entries.remarks)
+    teller.remarks.extend(remark for part in parts for remark in part.remarks)
     return teller.log(path)
+
+
+def _number(part: Path) -> tuple[int, str]:
+    """rosbag2 numbers the parts of a recording: name_0, name_1, ..."""
+    number = part.stem.rpartition("_")[2]
+    return (int(number) if number.isdecimal() else 0), part.name
 
 
 def _definition(schema: Schema) -> Any:
