@@ -44,9 +44,10 @@ def test_one_damaged_stamp_moves_no_other(number, damaged):
     assert [one - begin for one in found] == pytest.approx(TENTHS, abs=1.0)
 
 
-@given(number=st.integers(1, len(TENTHS) - 1), by=st.floats(-1e12, 1e12))
+@given(number=st.integers(1, len(TENTHS) - 1), by=st.floats(-1e12, 0.5) | st.floats(10.5, 1e12))
 def test_a_clock_that_was_set_moves_nothing(number, by):
-    """Given a clock that nobody sets beside it."""
+    """Given a clock that nobody sets beside it; what comes up to 10 s later may have been under
+    way."""
     stamps = [one + by * (k >= number) for k, one in enumerate(TENTHS)]
     found, _ = times(stamps, boot_time=TENTHS)
     assert found == sorted(found)
@@ -67,6 +68,12 @@ def test_a_damaged_stamp_is_told():
     found, remarks = times([3e8 if k == 60 else one for k, one in enumerate(TENTHS)])
     assert found[60] == TENTHS[59]
     assert remarks == ["damaged times (1): each counts as the time before it"]
+
+
+def test_what_a_radio_kept_is_no_clock_that_was_set():
+    """Given a radio that keeps what it gets for 3 s, and sends all of it at once."""
+    stamps = [103.0 if 100.0 < one < 103.0 else one for one in TENTHS]
+    assert times(stamps, boot_time=TENTHS) == (stamps, [])
 
 
 def test_a_silence_is_no_damage():

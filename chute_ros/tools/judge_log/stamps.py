@@ -17,6 +17,8 @@ _NEXT = 3
 _UNORDERED = 0.5
 #: A stamp that nothing follows, or that nothing is before, is at most so far from the others, s.
 _AT_THE_ENDS = 10.0
+#: A message may be so long on its way, s: its stamp is that of whom it reached.
+_BUFFERED = 10.0
 #: The longest silence of a log that is lived through, s.
 LONGEST_SILENCE = 600.0
 
@@ -32,7 +34,8 @@ def steady(
     A stamp that the next few do not follow is damaged, and takes the time before it. A jump that
     they follow is a clock that was set, if it goes back, or further ahead than longest_silence
     (s): what follows is shifted, as if no time had passed. boot_time: of each, by a clock that
-    nobody sets (s; NaN: none): a jump ahead of the stamps alone is a clock that was set as well.
+    nobody sets (s; NaN: none): what the stamps jump further ahead, by more than 10 s, is a clock
+    that was set as well.
     remarks: gets what a reader must be told of it, once all was taken.
     """
     source = zip(stamped, _or_none(boot_time), strict=False)
@@ -61,8 +64,7 @@ def steady(
                 yield newest, item
                 continue
             passed = _passed(newest_boot, [boot, *(when for _, when in following)])
-            is_set = jump < 0.0 or jump > longest_silence or abs(jump - passed) > _UNORDERED
-            if is_set:
+            if jump < 0.0 or jump > longest_silence or jump - passed > _BUFFERED:
                 jumps.append((newest - begin, jump))
                 raw_base = raw
                 base = newest + (passed if 0.0 <= passed <= longest_silence else 0.0)
