@@ -82,6 +82,12 @@ def test_a_silence_is_no_damage():
     assert times(map(float, stamps)) == (stamps, [])
 
 
+def test_a_topic_that_rests_until_its_last_message_keeps_its_time():
+    """Given PX4's home, which comes as it changes."""
+    stamps = [0.0, 1.0, 2.0, 3.0, 90.0]
+    assert times(stamps, longest_silence=math.inf) == (stamps, [])
+
+
 # -- whole logs --------------------------------------------------------------------------------
 
 

@@ -140,16 +140,20 @@ class _Entries:
     def __init__(self, reader: Any) -> None:
         self._reader = reader
         self._read = self._end = 0
+        # Logs before 3.1 have no times: it counts the entries of each kind, which part by seconds.
+        self._counts = "interpolated" in type(reader.clock).__name__
 
     def stamped(self, teller: _Teller) -> Iterator[tuple[float, Any]]:
         """Each entry of a moment with its own time (s); parameters, which have none, are told."""
+        newest = -math.inf
         while (entry := self._reader.recv_msg()) is not None:
             self._read += entry.fmt.len
             self._end = self._reader.offset
             if entry.get_type() == "PARM":
                 teller.parameter(entry)
             elif entry.get_type() in _READ:
-                yield entry._timestamp, entry
+                newest = max(newest, entry._timestamp) if self._counts else entry._timestamp
+                yield newest, entry
 
     @property
     def damaged(self) -> int:

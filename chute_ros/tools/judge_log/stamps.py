@@ -40,6 +40,8 @@ def steady(
     """
     source = zip(stamped, _or_none(boot_time), strict=False)
     ahead = deque(islice(source, _NEXT + 1))
+    # What may rest for as long as it likes does so before its last stamp as well.
+    at_the_end = _AT_THE_ENDS if math.isfinite(longest_silence) else math.inf
     damaged = 0
     #: (s from the begin, by how much).
     jumps: list[tuple[float, float]] = []
@@ -59,7 +61,8 @@ def steady(
         at = base + (raw - raw_base)
         jump = at - newest
         if not -_UNORDERED <= jump <= _UNORDERED:
-            if not _followed(raw, jump, [stamp for stamp, _ in following]):
+            last = not following and 0.0 < jump <= at_the_end
+            if not (last or _followed(raw, jump, [stamp for stamp, _ in following])):
                 damaged += 1
                 yield newest, item
                 continue
@@ -87,8 +90,6 @@ def _followed(raw: float, jump: float, following: list[float]) -> bool:
     """Whether most of the next stamps go on from this one, and not from those before it."""
     if not math.isfinite(raw):
         return False
-    if not following:
-        return 0.0 < jump <= _AT_THE_ENDS
     # Behind a jump ahead everything that does not go back is later.
     until = math.inf if jump > 0.0 else -jump - _UNORDERED
     on = sum(-_UNORDERED <= one - raw < until for one in following)
