@@ -42,8 +42,8 @@ class Shipped:
         return replace(self._configs[key], standby=standby, rank=rank)
 
     def profile_file(self, kind: str) -> Path:
-        """The profile by which a vehicle of this kind flies."""
-        return self._folder / f"{kind}.yaml"
+        """The profile by which a vehicle of this kind flies; kind: also the name of its file."""
+        return self._folder / (kind if kind.endswith((".yaml", ".yml")) else f"{kind}.yaml")
 
     def tape(self, name: str) -> Tape:
         """The tape with this name. RecordError: there is none."""

@@ -5,15 +5,18 @@ from __future__ import annotations
 import sys
 import time
 
+from chute_ros.plain_text import plain
+
 #: Work that takes no longer (s) says nothing; after that this often.
 _EVERY = 2.0
 
 
 class Progress:
-    """what: the work, in words; whole: how much there is of it, in any unit."""
+    """what: the work, in words, of which a file's name may be a part; whole: how much there is of
+    it, in any unit."""
 
     def __init__(self, what: str, whole: int) -> None:
-        self._what, self._whole = what, max(1, whole)
+        self._what, self._whole = plain(what), max(1, whole)
         self._say_at = time.monotonic() + _EVERY
 
     def at(self, done: int) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from chute_msgs.msg import VehicleState
 from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -185,15 +185,19 @@ TOPICS = {
 _ULOG_TYPES = {"float": "f", "double": "d", "uint8_t": "B", "bool": "?"}
 
 
-def ulog(told: Iterable[Told], path: Path) -> Path:
-    """As PX4 writes it."""
+def ulog(told: Iterable[Told], path: Path, home_z: float | None = None, valid_alt: bool = True) -> Path:
+    """As PX4 writes it: without valid_alt as old ones do; with home_z as new ones do, for which
+    heights begin there; a home that is not valid is full of zeros."""
+    topics = dict(TOPICS)
+    if home_z is not None:
+        topics["home_position"] = [*TOPICS["home_position"], "bool valid_alt"]
     parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)]
 
     def message(kind: str, payload: bytes) -> None:
         parts.append(struct.pack("<HB", len(payload), ord(kind)) + payload)
 
     message("B", bytes(40))
-    for name, fields in TOPICS.items():
+    for name, fields in topics.items():
         message("F", f"{name}:uint64_t timestamp;{';'.join(fields)};".encode())
     key = b"int32_t MAV_TYPE"
     message("P", bytes([len(key)]) + key + struct.pack("<i", 2))
@@ -202,7 +206,9 @@ def ulog(told: Iterable[Told], path: Path) -> Path:
         message("A", struct.pack("<BH", 0, number) + name.encode())
     for at, name, values in _topics(told):
         form = "<HQ"
-        for field in TOPICS[name]:
+        if name == "home_position" and home_z is not None:
+            values = (*values[:3], home_z, True) if valid_alt else (0.0, 0.0, 0.0, 0.0, False)
+        for field in topics[name]:
             kind, _, length = field.split()[0].partition("[")
             form += f"{length.rstrip(']')}{_ULOG_TYPES[kind]}"
         message("D", struct.pack(form, numbers[name], round(at * 1e6), *values))
@@ -245,21 +251,28 @@ def _topics(told: Iterable[Told]) -> Iterable[tuple[float, str, tuple[Any, ...]]
 # -- ROS --------------------------------------------------------------------------------------
 
 
-def mavros(told: Iterable[Told], path: Path) -> Path:
-    """A rosbag2 folder with what MAVROS publishes in types of ROS itself."""
+def mavros(
+    told: Iterable[Told],
+    path: Path,
+    others: Iterable[tuple[str, str, tuple[Any, ...]]] = (),
+    storage: StoragePlugin = StoragePlugin.SQLITE3,
+) -> Path:
+    """A rosbag2 folder with what MAVROS publishes in types of ROS itself. others: what is published
+    besides, before each position: topic, type, values."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = {
         "/mavros/global_position/rel_alt": "std_msgs/msg/Float64",
         "/mavros/local_position/velocity_local": "geometry_msgs/msg/TwistStamped",
         "/mavros/imu/data": "sensor_msgs/msg/Imu",
         "/mavros/imu/static_pressure": "sensor_msgs/msg/FluidPressure",
+        **{topic: kind for topic, kind, _ in others},
     }
     made = {name: store.types[name] for name in {*types.values(), *_PARTS}}
     header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
     vector, quaternion = made["geometry_msgs/msg/Vector3"], made["geometry_msgs/msg/Quaternion"]
     still, none = vector(0.0, 0.0, 0.0), np.zeros(9)
     turned = quaternion(0.0, 0.0, 0.0, 1.0)
-    with Writer(path, version=9) as writer:
+    with Writer(path, version=9, storage_plugin=storage) as writer:
         ways = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in types.items()}
 
         def say(topic: str, at: float, *values: Any) -> None:
@@ -271,6 +284,8 @@ def mavros(told: Iterable[Told], path: Path) -> Path:
             message, kind = one.message, one.message.get_type()
             if kind == "GLOBAL_POSITION_INT":
                 up = vector(0.0, 0.0, message.vz / -100.0)
+                for topic, _, values in others:
+                    say(topic, one.at, *values)
                 twist = made["geometry_msgs/msg/Twist"](up, still)
                 say("/mavros/local_position/velocity_local", one.at, header, twist)
                 say("/mavros/global_position/rel_alt", one.at, message.relative_alt / 1e3)

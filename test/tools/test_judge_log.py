@@ -3,30 +3,47 @@
 from __future__ import annotations
 
 import contextlib
-import functools
+import copy
 import math
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_bench import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from log_bench import FAILS, FAILS_AT, FORMATS, HEIGHT, LANDED_AT, LANDS, Told, dataflash, flown
-from rosbags.rosbag2 import Writer
+from log_bench import (
+    FAILS,
+    FAILS_AT,
+    FORMATS,
+    HEIGHT,
+    LANDED_AT,
+    LANDS,
+    Told,
+    dataflash,
+    flown,
+    mavros,
+    ulog,
+)
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from chute_ros.model import VTOL, Action
-from chute_ros.tools.judge_log import command, formats, table
+from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.ros.config_folder import config_folder
+from chute_ros.tools.judge_log import command, formats, table, told
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import JudgedLog
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
+from chute_ros.tools.progress import Progress
 
 EACH = pytest.mark.parametrize("name", FORMATS)
 # Flights are flown and judged once for all.
@@ -54,7 +71,7 @@ def judged(path: Path, profile: str | None = None) -> JudgedLog:
 def fell(fallen: list[Told], tmp_path_factory) -> Callable[[str], JudgedLog]:
     """fell(name of a format): the flight whose motor fails, judged by that log."""
     folder = tmp_path_factory.mktemp("fell")
-    return functools.cache(lambda name: judged(FORMATS[name](fallen, folder / name)))
+    return cache(lambda name: judged(FORMATS[name](fallen, folder / name)))
 
 
 def highest(one: JudgedLog) -> float:
@@ -103,6 +120,34 @@ def test_the_attitude_and_the_force_are_those_of_the_flight(name, fell):
     assert all(state.tilt < 0.05 for state in before)
 
 
+@pytest.mark.parametrize(
+    ("home", "higher"),
+    [
+        ({}, 0.0),
+        ({"home_z": 3.0}, 3.0),
+        ({"home_z": 3.0, "valid_alt": False}, 0.0),
+    ],
+)
+def test_a_height_of_px4_is_above_a_valid_home_or_the_origin(home, higher, landed, tmp_path):
+    """Given a home at the altitude of the take-off, one 3 m below the origin, and one that is not
+    valid, whose altitude is 0: heights were by 488 m higher."""
+    raised = [replace(one, message=_raised(one.message)) for one in landed]
+    log = formats.read(ulog(raised, tmp_path / "flight.ulg", **home), {})
+    heights = [m.relative_alt / 1e3 for _, m in log.messages if hasattr(m, "relative_alt")]
+    assert max(heights) == pytest.approx(HEIGHT + higher, abs=0.5)
+    homes = [m.altitude for _, m in log.messages if m.get_type() == "HOME_POSITION"]
+    assert bool(homes) is home.get("valid_alt", True)
+
+
+def _raised(message: Any) -> Any:
+    """Where the ground is 488 m high."""
+    if message.get_type() != "GLOBAL_POSITION_INT":
+        return message
+    higher = copy.copy(message)
+    higher.alt = message.alt + 488_000
+    return higher
+
+
 # -- what is damaged ---------------------------------------------------------------------------
 
 
@@ -142,6 +187,26 @@ def test_a_damaged_log_is_read_or_refused_in_words(data, whole, tmp_path):
         assert formats.read(path, {}).messages
 
 
+@pytest.mark.parametrize("name", ["flight.tlog", "flight.bin", "flight.log"])
+def test_a_log_whose_first_bytes_are_damaged_is_known_by_its_name(name, fallen, tmp_path):
+    path = FORMATS[name](fallen, tmp_path / name)
+    path.write_bytes(b"\xff" * 20 + path.read_bytes()[20:])
+    assert [one.action for _, one in judged(path).fired][:1] == [Action.KILL]
+
+
+def test_an_mcap_is_known_by_its_first_bytes(fallen, tmp_path):
+    path = FORMATS["box.mcap"](fallen, tmp_path / "box.mcap")
+    box, other = formats.read(path, {}), path.rename(tmp_path / "box")
+    assert numbers(formats.read(other, {})) == numbers(box)
+
+
+def test_a_recording_that_was_cut_off_too_early_says_so(fallen, tmp_path):
+    path = FORMATS["box.mcap"](fallen, tmp_path / "box.mcap")
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(LogError, match=r"no topic reports a height.*ends in the middle"):
+        formats.read(path, {})
+
+
 @pytest.mark.parametrize("name", [one for one in FORMATS if "." in one])
 def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
     path = FORMATS[name](fallen, tmp_path / name)
@@ -149,12 +214,29 @@ def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
     assert [one.action for _, one in judged(path).fired][:1] == [Action.KILL]
 
 
+@pytest.mark.parametrize(("middle", "tail"), [(5000, 0), (0, 5000), (300, 300), (0, 0)])
+def test_damage_of_a_binary_log_is_told_in_a_line(middle, tail, landed, tmp_path, capfd):
+    """Given zeros between two entries, and behind the last one, where a few are no damage. A part
+    of its reader writes past Python, to the terminal itself."""
+    path = dataflash(landed, tmp_path / "flight.bin")
+    whole = path.read_bytes()
+    place = whole.index(b"\xa3\x95\x81", len(whole) // 2)
+    path.write_bytes(whole[:place] + bytes(middle) + whole[place:] + bytes(tail))
+    log = formats.read(path, {})
+    damaged = middle + (tail if tail > 528 else 0)
+    assert log.remarks == [f"{damaged} damaged bytes were passed over"] * bool(damaged)
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
         ("empty.bin", b"", "it is empty"),
         ("notes.txt", b"the flight went well\n", "no log of a known format (ArduPilot's .bin"),
-        ("noise.tlog", bytes(range(256)) * 20, "no log of a known format"),
+        ("noise.dat", bytes(range(256)), "no log of a known format"),
+        ("noise.tlog", bytes(range(256)), "no heartbeat of an autopilot is in it"),
+        ("noise.bin", bytes(range(256)), "no log of ArduPilot"),
+        ("noise.mcap", bytes(range(256)), "no recording of ROS"),
         ("table.csv", b"a,b\n1,2\n", "no column for time and height; its first line has a, b"),
         ("table.csv", b"time,height\n1,x\n", "no flight: of 1 rows 0 have a number for time "),
         ("table.csv", b"time," + b"a" * 200_000 + b"\n1,2\n", "no table: field larger than"),
@@ -173,6 +255,49 @@ def test_what_is_no_log_is_refused(name, text, says, tmp_path):
         formats.read(path, {})
     assert says in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [1e300, -1e300, 1e42, math.inf, math.nan])
+def test_a_number_that_no_wire_carries_counts_as_not_told(number):
+    """Given one such number after the other in each message that a log becomes."""
+    encoder = FrameEncoder(1, 1)
+    makers: list[tuple[Callable[..., Any], list[Any]]] = [
+        (told.attitude, [0.1, 0.2, 0.3]),
+        (told.position, [5.0, 1.0, 400.0, 47.0, 8.0]),
+        (told.pressure, [101_325.0]),
+        (partial(told.acceleration, 0), [0.0, 0.0, -9.8]),
+        (told.battery, [15.0, 0.5]),
+        (lambda *five: told.attitude_target(five[:4], five[4]), [1.0, 0.0, 0.0, 0.0, 0.5]),
+        (told.position_target, [5.0, 1.0]),
+        (told.local_position, [5.0, 1.0]),
+        (told.wing_target, [0.1, 0.2, 3.0]),
+        (told.home, [400.0, 47.0, 8.0, 0.0]),
+    ]
+    for make, right in makers:
+        for place in range(len(right)):
+            message = make(*[number if k == place else one for k, one in enumerate(right)])
+            assert message is None or encoder.encode(message, 0.0)
+    assert told.position(number, 1.0, 400.0, 47.0, 8.0) is None, "it would have no height"
+    assert told.acceleration(0, math.nan, 0.0, 0.0) is None, "that would be a free fall"
+    assert told.position(5.0, 1.0, 400.0, number, 8.0).relative_alt == 5000
+    assert told.home(400.0, number, 8.0, 0.0).altitude == 400_000
+
+
+def test_a_log_that_cannot_be_judged_keeps_no_other_from_it(landed, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    bad, good = begun(landed, tmp_path), tmp_path / "good.tlog"
+    good.write_bytes(bad.read_bytes())
+    fly = command.fly
+
+    def fails(log: FlightLog, *arguments: Any) -> JudgedLog:
+        if log.path == bad:
+            raise OverflowError("a number")
+        return fly(log, *arguments)
+
+    monkeypatch.setattr(command, "fly", fails)
+    _, errors = refused(command, monkeypatch, capsys, str(bad), str(good))
+    assert errors.strip() == f"judge_log: {bad}: it cannot be judged: a number"
+    assert "good.tlog" in (tmp_path / "judged.html").read_text()
 
 
 # -- rockets -----------------------------------------------------------------------------------
@@ -232,6 +357,52 @@ def test_a_unit_that_is_not_known_is_not_guessed(tmp_path):
     assert log.remarks == ["height from 'height (furlong)', time from 'time'"]
 
 
+@pytest.mark.parametrize(
+    ("headings", "used"),
+    [
+        (("time_s", "altitude_m", "velocity_ms"), None),
+        (("Time (s)", "Altitude (m)", "Vertical velocity (ms)"), None),
+        (("time", "altitude", "speed (m)"), None),
+        (("time", "altitude", "speed_s"), None),
+        (("time", "altitude", "velocity_fps"), "velocity_fps"),
+        (("time_m", "altitude_m", "speed"), "no column for time and height"),
+        (("time (ft)", "altitude", "speed"), "no column for time and height"),
+        (("time", "altitude_s", "speed"), "no column for time and height"),
+        (("time", "altitude_ms", "speed"), "no column for time and height"),
+    ],
+)
+def test_a_unit_of_another_quantity_is_not_known(headings, used, tmp_path):
+    """Given a speed in ms, which is no speed: the heights tell it."""
+    path = tmp_path / "rocket.csv"
+    rows = [",".join(headings), *(f"{k / 10},{k},3" for k in range(100))]
+    path.write_text("\n".join(rows))
+    if used == "no column for time and height":
+        with pytest.raises(LogError, match=used):
+            formats.read(path, {})
+        return
+    (remark,) = formats.read(path, {}).remarks
+    assert ("vertical_speed" in remark) is bool(used)
+    assert used is None or f"vertical_speed from {used!r}" in remark
+
+
+@pytest.mark.parametrize(
+    ("heading", "apart", "is_read"),
+    [("time", 50, False), ("time", 5, True), ("time (s)", 50, True), ("time (ms)", 50, True)],
+)
+def test_times_without_a_unit_are_seconds_only_if_rows_come_as_often(
+    heading, apart, is_read, tmp_path
+):
+    """Given an altimeter that writes milliseconds at 20 Hz, or one that writes every 5 s."""
+    path = tmp_path / "rocket.csv"
+    rows = "".join(f"{k * apart},{k}\n" for k in range(100))
+    path.write_text(f"{heading},height\n{rows}")
+    if is_read:
+        assert formats.read(path, {}).messages
+        return
+    with pytest.raises(LogError, match=r"its rows are 50 s apart: if 'time' is in other units"):
+        formats.read(path, {})
+
+
 def test_a_heading_that_was_given_and_is_not_there_is_not_replaced_by_another(tmp_path):
     path = tmp_path / "rocket.csv"
     path.write_text(rocket(25.0, "time", "height", 1.0))
@@ -246,6 +417,26 @@ def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
         writer.write(topic, 10**9, store.serialize_cdr(store.types[kind](21.0), kind))
     with pytest.raises(LogError, match="no topic reports a height"):
         formats.read(tmp_path / "other", {})
+
+
+STRANGERS = [
+    ("/planner/state", "std_msgs/msg/String", ("IDLE",)),
+    ("/lidar/altitude", "std_msgs/msg/Float64", (1.5,)),
+    ("/gripper/battery", "std_msgs/msg/Float32", (12.0,)),
+    ("/zed/local_position/odom", "std_msgs/msg/Float32", (12.0,)),
+    ("/other/global_position/rel_alt", "std_msgs/msg/Float64", (math.nan,)),
+]
+
+
+@pytest.mark.parametrize("storage", StoragePlugin)
+def test_topics_of_another_program_change_nothing(storage, fallen, tmp_path):
+    """Given topics that end as those of MAVROS do, of other types, or without a number."""
+    alone = mavros(fallen, tmp_path / "alone", storage=storage)
+    beside = mavros(fallen, tmp_path / "beside", STRANGERS, storage)
+    (file,) = beside.glob(f"*.{'mcap' if storage is StoragePlugin.MCAP else 'db3'}")
+    log = formats.read(file, {})
+    assert numbers(log) == numbers(formats.read(alone, {}))
+    assert log.remarks == ["nothing reports when it was armed: taken to be armed throughout"]
 
 
 def test_a_fifo_is_not_waited_for(tmp_path):
@@ -279,17 +470,29 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
     one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
     assert "ATTITUDE has never come" not in "".join(text for _, text in one.said)
     assert one.flew > LANDED_AT - 5.0
-    told = {part.name: part for part in unknown(one)}
-    assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
+    missing = {part.name: part for part in unknown(one)}
+    assert (missing["tilt_deg"].share, missing["tilt_deg"].why) == (1.0, "never received")
     tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")
     assert tilt.blind > 0.9
+
+
+def test_what_was_missing_to_be_in_flight_is_told(landed, tmp_path):
+    """Given a log with an attitude alone: nothing tells a take-off."""
+    kinds = ("HEARTBEAT", "ATTITUDE")
+    fewer = [one for one in landed if one.message.get_type() in kinds]
+    one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
+    verdict = verdict_of(one)
+    assert verdict.words == "never in flight"
+    missing = {part.name: part for part in verdict.unknown}
+    assert (missing["height"].share, missing["height"].why) == (1.0, "never received")
+    assert "it was never in flight: in the whole log" in flight_section(0, verdict, one, [])
 
 
 def test_a_rule_that_waits_for_nothing_is_told_without_a_counter(fell):
     """`parachute open` has no `for`: its counter has no highest, which was told as nan s."""
     one = fell("flight.tlog")
-    told = {rating.told.name: rating.told for rating in ratings(one)}
-    first = told[one.fired[0][1].rule]
+    rules = {rating.told.name: rating.told for rating in ratings(one)}
+    first = rules[one.fired[0][1].rule]
     assert command._came(replace(first, hold=0.0)) == (
         f"{first.name} fulfilled, {first.fulfilled_at:.1f} s"
     )
@@ -306,12 +509,24 @@ def swept(fell) -> tuple[JudgedLog, list[Tried]]:
 
 
 def test_a_sweep_tells_which_threshold_would_have_kept_it_clean(swept):
+    """Clean is a threshold with which nothing ends the whole log, by whatever rule."""
     one, tried = swept
     rule = next(r for r in one.config.profile.rules if r.name == one.fired[0][1].rule)
     assert {t.rule for t in tried} == {rule.name}
     hold = next(t for t in tried if t.what == "for (s)")
     assert hold.shipped == rule.hold
     assert not hold.clean <= hold.shipped
+    for t in tried:
+        assert math.isnan(t.clean) is bool(t.ended), t
+
+
+def test_a_fall_that_another_rule_ends_is_not_called_clean(swept):
+    """Given a fall that every rule sees, it lands hard whatever one of them waits for."""
+    _, tried = swept
+    hold = next(t for t in tried if t.what == "for (s)")
+    assert math.isnan(hold.clean)
+    assert " at " in hold.ended
+    assert hold.furthest == pytest.approx(3.0 * hold.shipped)
 
 
 def test_the_page_has_every_log_and_nothing_of_it_raw(swept, tmp_path):
@@ -324,7 +539,7 @@ def test_the_page_has_every_log_and_nothing_of_it_raw(swept, tmp_path):
     assert text.startswith("<!DOCTYPE html>")
     for raw in ("<script>", "<b>remark", "<i>", "<u>", "\x1b"):
         assert raw not in text
-    for part in ("KILL at", "Decisions", "How near each rule came", "not known", "clean from"):
+    for part in ("KILL at", "Decisions", "How near each rule came", "not known", "further out"):
         assert part in text
 
 
@@ -362,6 +577,12 @@ def test_the_exit_code_tells_whether_anything_would_have_left(landed, fallen, tm
     assert run(tmp_path / "none.bin", "--page", html).returncode == 2
 
 
+def test_the_name_of_a_file_stays_on_its_line_of_progress(monkeypatch, capsys):
+    monkeypatch.setattr("chute_ros.tools.progress._EVERY", 0.0)
+    Progress("judging a\n\x1b[2J.bin", 2).at(1)
+    assert capsys.readouterr().err == "judging a\\n\\x1b[2J.bin: 50 %\n"
+
+
 def begun(landed: list[Told], folder: Path) -> Path:
     """A log of the first 3 s."""
     return FORMATS["flight.tlog"]([one for one in landed if one.at < 3.0], folder / "begun.tlog")
@@ -382,6 +603,15 @@ def test_a_wrong_argument_is_refused(arguments, says, landed, tmp_path, monkeypa
     _, errors = refused(command, monkeypatch, capsys, log, *map(str, arguments))
     assert says in errors
     assert not (tmp_path / "judged.html").exists()
+
+
+@pytest.mark.parametrize("name", ["mine.yml", "mine.yaml"])
+def test_a_profile_of_ones_own_is_found_by_its_file(name, landed, tmp_path):
+    mine = tmp_path / "out" / name
+    mine.parent.mkdir()
+    mine.write_text((config_folder() / "profiles" / "rocket.yaml").read_text())
+    log = formats.read(begun(landed, tmp_path), {})
+    assert command.config_of(log, str(mine)).profile.name == "rocket"
 
 
 def test_a_wrong_argument_ends_it_in_a_line(landed, tmp_path):

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from command_bench import assert_refused
 from log_bench import FAILS, FAILS_AT, FALLS_FROM, LANDED_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command, formats
 from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
-from chute_ros.tools.judge_log.flight_log import LogError, without_gaps
+from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
 
 HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
@@ -71,8 +72,17 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
     assert 0.7 * FALLS_FROM < int(height) < FALLS_FROM
     assert "- none.bin: it is empty" in text
     assert "- well.tlog: some/repo: a/b.tlog" in text
-    with pytest.raises(ChuteError, match=r"no line for well\.tlog"):
-        page([landed], [], {})
+
+
+def test_a_log_of_which_nothing_is_known_is_told_before_any_is_judged(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    tlog(flown(LANDS, 3.0), tmp_path / "begun.tlog")
+    (tmp_path / "known.tsv").write_text(f"{HEAD}\nother.tlog\ty\tyes\tz\tflies\t\t\n")
+    arguments = ("begun.tlog", "--known", "known.tsv")
+    words = "--known has no line for begun.tlog"
+    assert_refused(command, monkeypatch, capsys, arguments, words)
 
 
 @pytest.mark.parametrize(
@@ -92,15 +102,3 @@ def test_a_table_that_is_none_is_refused(text, says, tmp_path):
         known_of(tsv)
     assert says in str(caught.value)
     assert str(tsv) in str(caught.value)
-
-
-def test_a_time_that_is_years_away_costs_its_own_gap():
-    """Given one damaged time among many."""
-    remarks: list[str] = []
-    moments = [*(k * 0.1 for k in range(50)), 3e8, 3e8 + 1.0]
-    shortened = without_gaps([(at + 7.0, None) for at in moments], remarks)
-    assert shortened[0][0] == 0.0
-    assert shortened[49][0] == pytest.approx(4.9)
-    assert shortened[-2][0] == pytest.approx(604.9)
-    assert shortened[-1][0] == pytest.approx(605.9)
-    assert remarks == ["a gap of 299999995 s is shortened to 600 s, 5 s after its begin"]

@@ -20,7 +20,7 @@ from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.tools.judge_log import formats, known, table
 from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
-from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
+from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, reason
 from chute_ros.tools.judge_log.log_flight import JudgedLog, fly
 from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
@@ -47,33 +47,44 @@ def main() -> None:
         require_output(given.page, HTML, read_here)
         if given.known:
             require_output(given.table, MARKDOWN, read_here)
+            what_happened = known.known_of(given.known)
+            known.require_all(given.files, what_happened)
         for path in given.files:
             try:
                 log = formats.read(path, columns)
+                one, verdict, tried = _judged(log, config_of(log, given.profile), given.sweep)
             except LogError as error:
                 unread.append((path, error))
                 complain("judge_log", error)
                 continue
-            one = flown(log, config_of(log, given.profile))
-            tried = sweep(one) if given.sweep else []
-            verdict = verdict_of(one)
             _tell(verdict, one, tried)
             # What was seen of a flight takes a hundred times as much memory.
             flights.append((verdict, flight_section(len(flights), verdict, one, tried)))
         if flights:
             write_page(given.page, page(flights, unread), HTML, read_here)
-            print(f"page: {given.page}")
+            print(f"page: {plain(given.page)}")
         if given.known:
             verdicts = [verdict for verdict, _ in flights]
-            told = known.page(verdicts, unread, known.known_of(given.known))
+            told = known.page(verdicts, unread, what_happened)
             write_page(given.table, told, MARKDOWN, read_here)
-            print(f"table: {given.table}")
+            print(f"table: {plain(given.table)}")
     except ChuteError as error:
         complain("judge_log", error)
         sys.exit(UNREADABLE)
     sys.exit(
         FIRED if any(verdict.ended for verdict, _ in flights) else UNREADABLE if unread else CLEAN
     )
+
+
+def _judged(
+    log: FlightLog, config: SupervisorConfig, sweeps: bool
+) -> tuple[JudgedLog, LogVerdict, list[Tried]]:
+    """LogError: it cannot be flown. The other logs are judged all the same."""
+    try:
+        one = flown(log, config)
+        return one, verdict_of(one), sweep(one) if sweeps else []
+    except Exception as error:  # noqa: BLE001 - whatever the numbers of a log make of it
+        raise LogError(f"{log.path}: it cannot be judged: {reason(error)}") from None
 
 
 def _options() -> argparse.ArgumentParser:
@@ -140,7 +151,7 @@ def config_of(log: FlightLog, profile: str | None) -> SupervisorConfig:
     name = profile or log.profile
     folder = config_folder() / "profiles"
     if name.endswith((".yaml", ".yml")) or "/" in name:
-        folder, name = Path(name).resolve().parent, Path(name).stem
+        folder, name = Path(name).resolve().parent, Path(name).name
     try:
         return Shipped(folder).config(_VEHICLE, name, False, 0)
     except UnicodeDecodeError as error:
@@ -166,7 +177,7 @@ def _came(rule: RuleTold) -> str:
 
 
 def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
-    log = one.log
+    log, span = one.log, "flight" if verdict.flew else "log"
     lines = [
         f"{log.path}: {log.format}, profile {one.config.profile.name}",
         f"  {log.duration:.0f} s, {verdict.flew:.0f} s in flight",
@@ -175,7 +186,7 @@ def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
     lines += [f"  nearest: {_came(one.told)}" for one in verdict.moved[:3]]
     lines += [
-        f"  not known: {u.name} for {100.0 * u.share:.0f} % of the flight ({u.why})"
+        f"  not known: {u.name} for {100.0 * u.share:.0f} % of the {span} ({u.why})"
         for u in verdict.unknown
         if u.share >= _TOLD
     ]
@@ -185,8 +196,7 @@ def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
         lines.append(f"  rules blind for a share of the flight: {shares}")
     lines += [f"  note: {text}" for text in log.remarks]
     for t in tried:
-        clean = f"clean from {t.clean:.3g}" if t.clean == t.clean else "not clean with any tried"
-        lines.append(f"  sweep: {t.rule}: {t.what} is {t.shipped:g}, {clean}")
+        lines.append(f"  sweep: {t.rule}: {t.what} is {t.shipped:g}, {t.words}")
     print("\n".join(map(plain, lines)), flush=True)
 
 

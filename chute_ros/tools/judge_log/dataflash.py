@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import bisect
 import contextlib
-import io
 import math
+import os
+import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "ArduPilot DataFlash"
@@ -45,6 +48,11 @@ _READ = frozenset(
         *("STAT", "ORGN", "PARM", "MSG", "VER", "XKF1", "NKF1", "EKF1", *_IMUS),
     }
 )
+#: A text begins to tell what is in it within so many bytes.
+_HEAD = 4096
+#: Logs in flash memory end with so many bytes of filling at most.
+_PAGE = 528
+_STDERR = 2
 #: What pymavlink makes of a log without any clock.
 _TIMELESS = "unsupported operand type(s) for *: 'int' and 'NoneType'"
 #: How the firmwares name themselves.
@@ -58,10 +66,8 @@ _NAMES = {
 
 def read(path: Path) -> FlightLog:
     """The log of this file; LogError if it is none."""
-    noise = io.StringIO()
     try:
-        # It writes of each damaged message.
-        with contextlib.redirect_stderr(noise), contextlib.redirect_stdout(noise):
+        with _silence():
             log = _read(path)
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
@@ -72,10 +78,25 @@ def read(path: Path) -> FlightLog:
         raise LogError(f"{path}: no log of ArduPilot that can be read: {why}") from None
     if not log.messages:
         raise LogError(f"{path}: no log of ArduPilot: nothing of a vehicle is in it")
-    damaged = noise.getvalue().count("\n")
-    if damaged:
-        log.remarks.append(f"{damaged} damaged places were left out")
     return log
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """pymavlink writes of each damaged byte, its compiled part past sys.stderr."""
+    sys.stderr.flush()
+    stderr = os.dup(_STDERR)
+    try:
+        with (
+            open(os.devnull, "w") as nothing,
+            contextlib.redirect_stdout(nothing),
+            contextlib.redirect_stderr(nothing),
+        ):
+            os.dup2(nothing.fileno(), _STDERR)
+            yield
+    finally:
+        os.dup2(stderr, _STDERR)
+        os.close(stderr)
 
 
 def _read(path: Path) -> FlightLog:
@@ -83,8 +104,9 @@ def _read(path: Path) -> FlightLog:
     from pymavlink import DFReader
 
     with open_regular(path) as file:
-        binary = file.read(2) == MAGIC
-    if binary:
+        head = file.read(_HEAD)
+    # The first bytes may be damaged, and a text has lines of the console before its first entry.
+    if head.startswith(MAGIC) or b"FMT," not in head:
         return _told(path, DFReader.DFReader_binary(str(path)), "")
     # Text logs until 3.1 have lines of the console before the first entry.
     with open_regular(path) as file:
@@ -103,10 +125,44 @@ def _told(path: Path, reader: Any, console: str) -> FlightLog:
     translator.said(console)
     # It closes nothing itself.
     with reader.filehandle, reader.data_map:
-        while (entry := reader.recv_msg()) is not None:
-            if entry.get_type() in _READ:
-                translator.take(entry)
-    return translator.log(path)
+        remarks: list[str] = []
+        entries = _Entries(reader)
+        for at, entry in steady(entries.stamped(translator), remarks):
+            translator.take(entry, at)
+        if damaged := entries.damaged:
+            remarks.append(f"{damaged} damaged bytes were passed over")
+    return translator.log(path, remarks)
+
+
+class _Entries:
+    """What pymavlink makes of a file."""
+
+    def __init__(self, reader: Any) -> None:
+        self._reader = reader
+        self._read = self._end = 0
+        # Logs before 3.1 have no times: it counts the entries of each kind, which part by seconds.
+        self._counts = "interpolated" in type(reader.clock).__name__
+
+    def stamped(self, translator: _DataflashTranslator) -> Iterator[tuple[float, Any]]:
+        """Each entry of a moment with its own time (s); parameters, which have none, are told."""
+        newest = -math.inf
+        while (entry := self._reader.recv_msg()) is not None:
+            self._read += entry.fmt.len
+            self._end = self._reader.offset
+            if entry.get_type() == "PARM":
+                translator.parameter(entry)
+            elif entry.get_type() in _READ:
+                newest = max(newest, entry._timestamp) if self._counts else entry._timestamp
+                yield newest, entry
+
+    @property
+    def damaged(self) -> int:
+        """Bytes of a binary log that were no entry; what fills the last page is no damage."""
+        if not hasattr(self._reader, "HEAD1"):
+            return 0
+        size: int = self._reader.data_len
+        behind = size - self._end
+        return size - self._read - (behind if behind < _PAGE else 0)
 
 
 class _DataflashTranslator:
@@ -141,16 +197,13 @@ class _DataflashTranslator:
             "ARM": self._arm,
             "STAT": self._stat,
             "ORGN": self._origin,
-            "PARM": self._parm,
             "MSG": self._msg,
         } | dict.fromkeys(_IMUS, self._imu)
 
-    def take(self, entry: Any) -> None:
-        """One entry of the log."""
+    def take(self, entry: Any, at: float) -> None:
+        """One entry of the log (s), none sooner than those before."""
         kind = entry.get_type()
-        if kind != "PARM":
-            # Clocks of old logs go back by fractions of a second.
-            self._at = max(self._at, entry._timestamp)
+        self._at = at
         self._newest[kind] = entry
         for number, (message, name, factor) in enumerate(_SPEEDS[: self._speed_of + 1]):
             if kind == message and hasattr(entry, name) and _instance(entry) == 0:
@@ -167,12 +220,11 @@ class _DataflashTranslator:
             if name in text:
                 self._vehicle_type = vehicle_type
 
-    def log(self, path: Path) -> FlightLog:
-        """All of it."""
+    def log(self, path: Path, remarks: list[str]) -> FlightLog:
+        """All of it. remarks: on how it was read."""
         vehicle_type = self._vehicle_type
         if self._parameters.get("Q_ENABLE", 0) > 0:
             vehicle_type = VTOL
-        remarks = []
         if "POS" not in self._newest:
             for at, message in self._by_controller or self._by_ahr2:
                 self._out.add(at, message)
@@ -185,7 +237,7 @@ class _DataflashTranslator:
             FORMAT,
             vehicle_type,
             dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-            self._out.in_order(remarks),
+            self._out.in_order(),
             self._parameters,
             remarks=remarks,
         )
@@ -206,6 +258,8 @@ class _DataflashTranslator:
             return
         thrust = self._thrust()
         yaw = math.radians(getattr(entry, "DesYaw", math.degrees(angles[2])))
+        if not math.isfinite(yaw):
+            return
         turned = quaternion_of(roll, pitch, yaw)
         self._out.add(self._at, told.attitude_target(turned, thrust))
 
@@ -295,8 +349,11 @@ class _DataflashTranslator:
     def _msg(self, entry: Any) -> None:
         self.said(str(entry.Message))
 
-    def _parm(self, entry: Any) -> None:
+    def parameter(self, entry: Any) -> None:
+        """One of the autopilot's."""
         value = float(entry.Value)
+        if not told.can_be_single(value):
+            return
         self._parameters[entry.Name] = int(value) if value.is_integer() else value
 
     # -- what was told as it changed -------------------------------------------------------------

@@ -18,7 +18,8 @@ _DIGITS = str.maketrans("0123456789", "0" * 10)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A measurement that could not be used for this share (0 to 1) of the flight, and why."""
+    """A measurement that could not be used for this share (0 to 1) of the flight, or of a log
+    without one, and why."""
 
     name: str
     share: float
@@ -96,10 +97,13 @@ def verdict_of(judged: JudgedLog) -> LogVerdict:
 
 def _words(judged: JudgedLog) -> str:
     if judged.fired:
-        return ", ".join(
-            f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
-        )
+        return fired_words(judged)
     return "nothing ended the flight" if judged.flew else "never in flight"
+
+
+def fired_words(judged: JudgedLog) -> str:
+    """What ended it, and when; empty: nothing did."""
+    return ", ".join(f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired)
 
 
 def height_at(judged: JudgedLog, at: float) -> float:
@@ -121,17 +125,19 @@ def ratings(judged: JudgedLog) -> tuple[Rating, ...]:
 
 
 def unknown(judged: JudgedLog) -> tuple[Unknown, ...]:
-    """What of the vehicle could not be used in flight, the longest first."""
-    in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
+    """What of the vehicle could not be used in flight, the longest first; of a vehicle that was
+    never in flight, in the whole log: that may be why."""
+    looked_at = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
+    looked_at = looked_at or [one for at, one in judged.pictures if at >= 0.0]
     reasons: dict[str, Counter[str]] = {}
-    for one in in_flight:
+    for one in looked_at:
         for line in one.unusable:
             name, _, why = line.partition(": ")
             reasons.setdefault(name, Counter())[why.translate(_DIGITS)] += 1
-    lines = [line.partition(": ") for one in in_flight for line in one.unusable]
+    lines = [line.partition(": ") for one in looked_at for line in one.unusable]
     newest = {name: why for name, _, why in lines}
     found = [
-        Unknown(name, sum(whys.values()) / len(in_flight), newest[name])
+        Unknown(name, sum(whys.values()) / len(looked_at), newest[name])
         for name, whys in reasons.items()
     ]
     return tuple(sorted(found, key=lambda one: -one.share))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,6 @@ from chute_ros.model import Airframe, airframes_of
 
 #: No link carries a message of one kind more often than this, s.
 _APART = 0.02
-#: The longest silence of a log that is lived through, s.
-_GAP = 600.0
 
 
 class LogError(ChuteError):
@@ -68,7 +66,9 @@ class MessageLog:
 
     def add(self, at: float, message: Any, which: Any = None) -> None:
         """which: of several of a kind. What comes sooner after the one before than any link
-        carries it is left out."""
+        carries it is left out; message None: nothing was told."""
+        if message is None:
+            return
         key = (message.get_msgId(), which)
         # A hundredth of a step: times are rounded.
         if math.isfinite(at) and at - self._newest.get(key, -math.inf) >= _APART * 0.99:
@@ -76,8 +76,8 @@ class MessageLog:
             self._messages.append((at, message))
 
     def add_change(self, at: float, message: Any) -> None:
-        """A message that is never left out."""
-        if math.isfinite(at):
+        """A message that is left out only if it is None."""
+        if message is not None and math.isfinite(at):
             self._messages.append((at, message))
 
     def seconds(self) -> list[float]:
@@ -85,25 +85,7 @@ class MessageLog:
         found = {math.floor(at): at for at, _ in reversed(self._messages)}
         return sorted(found.values())
 
-    def in_order(self, remarks: list[str]) -> list[tuple[float, Any]]:
-        """From the first on, whose time is 0. remarks: gets what a reader must be told of it."""
-        return without_gaps(sorted(self._messages, key=lambda one: one[0]), remarks)
-
-
-def without_gaps(
-    messages: Sequence[tuple[float, Any]], remarks: list[str]
-) -> list[tuple[float, Any]]:
-    """The same from time 0 on, and no silence longer than _GAP: a damaged time is years away."""
-    found, shift, before = [], 0.0, math.nan
-    for at, message in messages:
-        if math.isnan(before):
-            shift = at
-        elif at - before > _GAP:
-            shift += at - before - _GAP
-            remarks.append(
-                f"a gap of {at - before:.0f} s is shortened to {_GAP:g} s, "
-                f"{before - messages[0][0]:.0f} s after its begin"
-            )
-        before = at
-        found.append((at - shift, message))
-    return found
+    def in_order(self) -> list[tuple[float, Any]]:
+        """From the first on, whose time is 0."""
+        ordered = sorted(self._messages, key=lambda one: one[0])
+        return [(at - ordered[0][0], message) for at, message in ordered]

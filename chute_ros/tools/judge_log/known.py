@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,6 +58,13 @@ def known_of(path: Path) -> dict[str, Known]:
     return {one.file: one for one in found}
 
 
+def require_all(files: Sequence[Path], known: Mapping[str, Known]) -> None:
+    """ChuteError: of one of them nothing is known."""
+    missing = [path.name for path in files if path.name not in known]
+    if missing:
+        raise ChuteError(f"--known has no line for {', '.join(missing)}")
+
+
 def _known(row: dict[str, str]) -> Known:
     if row["right"] not in (FLIES, ENDS, EITHER):
         needed = f"need {FLIES}, {ENDS} or {EITHER}"
@@ -86,10 +93,7 @@ def page(
     unread: Sequence[tuple[Path, LogError]],
     known: dict[str, Known],
 ) -> str:
-    """The page. ChuteError: of a log nothing is known."""
-    missing = [one.path.name for one in verdicts if one.path.name not in known]
-    if missing:
-        raise ChuteError(f"--known has no line for {', '.join(missing)}")
+    """The page. known: of each log that was read, at least."""
     rows = [(known[one.path.name], one) for one in verdicts]
     wrong = sum(bool(mistake(what, one)) for what, one in rows)
     real = sum(what.real for what, _ in rows)

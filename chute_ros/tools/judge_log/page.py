@@ -78,7 +78,7 @@ def flight_section(place: int, verdict: LogVerdict, one: JudgedLog, tried: Seque
         _decisions(one),
         "<h3>How near each rule came</h3>",
         _ratings(verdict.ratings),
-        "<h3>What was not known in flight</h3>",
+        "<h3>What was not known</h3>",
         _unknown(one, verdict.unknown),
     ]
     if reasons := blocked(one):
@@ -163,10 +163,10 @@ def _ratings(ratings: Sequence[Rating]) -> str:
 
 
 def _unknown(one: JudgedLog, unknown: Sequence[Unknown]) -> str:
-    if not any(p.state == Stage.IN_FLIGHT for _, p in one.pictures):
-        return '<p class="dim">it was never in flight</p>'
-    return table(
-        ("measurement", "share of the flight, %", "reason, the newest"),
+    flew = any(p.state == Stage.IN_FLIGHT for _, p in one.pictures)
+    never = "" if flew else '<p class="dim">it was never in flight: in the whole log</p>\n'
+    return never + table(
+        ("measurement", f"share of the {'flight' if flew else 'log'}, %", "reason, the newest"),
         (
             (cell(escaped(u.name)), number(f"{100.0 * u.share:.0f}"), words(escaped(u.why)))
             for u in unknown
@@ -176,13 +176,13 @@ def _unknown(one: JudgedLog, unknown: Sequence[Unknown]) -> str:
 
 def _tried(tried: Sequence[Tried]) -> str:
     return table(
-        ("rule", "threshold", "shipped", "clean from"),
+        ("rule", "threshold", "shipped", "further out"),
         (
             (
                 cell(escaped(t.rule)),
                 cell(escaped(t.what)),
                 number(f"{t.shipped:g}"),
-                number(f"{t.clean:.3g}" if t.clean == t.clean else "none of those tried"),
+                words(escaped(t.words)),
             )
             for t in tried
         ),

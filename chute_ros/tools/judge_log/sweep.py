@@ -10,31 +10,39 @@ from dataclasses import dataclass, replace
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.rules import Rule
+from chute_ros.tools.judge_log.findings import fired_words
 from chute_ros.tools.judge_log.log_flight import JudgedLog, fly
 from chute_ros.tools.progress import Progress
 
 #: How much further out a threshold is tried, one after the other.
 FACTORS = (1.1, 1.25, 1.5, 2.0, 3.0)
-#: So long after the decision that ended it the flight must stay clean, s.
-_STAYS = 5.0
 
 
 @dataclass(frozen=True)
 class Tried:
     """One threshold of the rule that ended a flight. clean: the least value that was tried with
-    which this rule did not end it; NaN: none of them."""
+    which nothing ends it; NaN: none of them, and ended says what does with the furthest one."""
 
     rule: str
     what: str
     shipped: float
     clean: float
+    furthest: float
+    ended: str
+
+    @property
+    def words(self) -> str:
+        """What became of it."""
+        if math.isnan(self.clean):
+            return f"not clean: with {self.furthest:.3g} {self.ended}"
+        return f"clean from {self.clean:.3g}"
 
 
 def sweep(judged: JudgedLog) -> list[Tried]:
     """Each threshold of the rule that ended this flight; empty: none ended it."""
     if not judged.fired:
         return []
-    at, first = judged.fired[0]
+    _, first = judged.fired[0]
     rule = next((one for one in judged.config.profile.rules if one.name == first.rule), None)
     if rule is None:
         return []
@@ -43,14 +51,15 @@ def sweep(judged: JudgedLog) -> list[Tried]:
     progress = Progress(f"sweeping {judged.log.path.name}", len(thresholds))
     for number, (what, shipped, change) in enumerate(thresholds):
         progress.at(number)
-        clean = math.nan
+        clean, ended = math.nan, ""
         for factor in FACTORS:
             config = _with(judged.config, rule, change(factor))
-            again = fly(judged.log, config, at + _STAYS, _silent)
-            if not any(one.rule == rule.name for _, one in again.fired):
+            # To its end: another rule, or the same one, may end it later.
+            ended = fired_words(fly(judged.log, config, judged.log.duration, _silent))
+            if not ended:
                 clean = shipped * factor
                 break
-        found.append(Tried(rule.name, what, shipped, clean))
+        found.append(Tried(rule.name, what, shipped, clean, shipped * FACTORS[-1], ended))
     return found
 
 

@@ -11,6 +11,7 @@ import itertools
 import math
 import re
 import statistics
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from pathlib import Path
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "table"
@@ -31,27 +33,29 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 }
 #: Words of headings that say how or where, and not what.
 _BESIDES = frozenset({"agl", "filtered", "baro", "barometer", "kalman", "aprox", "est", "raw"})
-#: Units in headings: how many of ours one is.
-_UNITS = {
-    **dict.fromkeys(
-        ("", "s", "sec", "seconds", "m", "m/s", "m/s^2", "m/s2", "pa", "pascals"), 1.0
-    ),
-    **dict.fromkeys(("ft", "feet", "fps", "ft/s", "ft/sec", "ft/s^2", "ft/s2"), 0.3048),
-    "ms": 1e-3,
-    "us": 1e-6,
-    "hpa": 100.0,
-    "mbar": 100.0,
-    "kpa": 1e3,
-    "km": 1e3,
-    "mph": 0.44704,
-    "km/h": 1 / 3.6,
+#: Units in headings, of each column: how many of ours one is.
+_UNITS: dict[str, dict[str, float]] = {
+    "time": {**dict.fromkeys(("", "s", "sec", "seconds"), 1.0), "ms": 1e-3, "us": 1e-6},
+    "height": {"": 1.0, "m": 1.0, "km": 1e3, "ft": 0.3048, "feet": 0.3048},
+    "vertical_speed": {
+        **dict.fromkeys(("", "m/s", "mps"), 1.0),
+        **dict.fromkeys(("fps", "ft/s", "ft/sec"), 0.3048),
+        "mph": 0.44704,
+        "km/h": 1 / 3.6,
+    },
+    "pressure": {
+        **dict.fromkeys(("", "pa", "pascals"), 1.0),
+        **dict.fromkeys(("hpa", "mbar"), 100.0),
+        "kpa": 1e3,
+    },
 }
 _HEADING = re.compile(r"([^(\[]*)(?:[(\[]([^)\]]*))?")
 _GIVEN = re.compile(r"(\w+)=(.+?)(?:\*([-+.\deE]+))?$")
 #: A speed by the heights of so long, s.
 _SLOPE = 0.5
-#: Most rows of a flight come sooner, s.
-_FURTHEST_APART = 60.0
+#: Most rows of a flight come sooner, s: by times without a unit, which may be milliseconds, and by
+#: times that are said to be seconds.
+_FURTHEST_APART, _FURTHEST_SECONDS = 6.0, 60.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,6 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
             values.append(one)
         else:
             bad += 1
-    values.sort(key=lambda one: one["time"])
     headings = rows[begin - 1]
     used = ", ".join(f"{name} from {headings[at].strip()!r}" for name, (at, _) in places.items())
     if len(values) < 2:
@@ -101,7 +104,9 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
             f"{path}: no flight: of {len(rows) - begin} rows {len(values)} have a number for time "
             f"and height ({used}): name others by --column"
         )
-    _check_times(path, [one["time"] for one in values], headings[places["time"][0]])
+    unknown_unit = "time" not in given and not _split(headings[places["time"][0]], "time")[1]
+    furthest = _FURTHEST_APART if unknown_unit else _FURTHEST_SECONDS
+    _check_times(path, [one["time"] for one in values], headings[places["time"][0]], furthest)
     remarks = [f"{bad} rows without a time or a height were left out"] if bad else []
     messages = _told(values, remarks)
     return FlightLog(
@@ -114,10 +119,12 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
     )
 
 
-def _check_times(path: Path, times: Sequence[float], heading: str) -> None:
+def _check_times(path: Path, times: Sequence[float], heading: str, furthest: float) -> None:
     """LogError: in seconds they cannot be."""
     apart = statistics.median(b - a for a, b in itertools.pairwise(times))
-    if apart > _FURTHEST_APART:
+    if apart < 0.0:
+        raise LogError(f"{path}: its rows are not in the order of time, by {heading.strip()!r}")
+    if apart > furthest:
         raise LogError(
             f"{path}: its rows are {apart:.3g} s apart: if {heading.strip()!r} is in other units, "
             f"--column 'time={heading.strip()}*FACTOR' makes seconds of it"
@@ -149,37 +156,38 @@ def _found(row: Sequence[str], given: Mapping[str, Column]) -> dict[str, tuple[i
     for name, one in given.items():
         if one.heading in cells:
             places[name] = (cells.index(one.heading), one.factor)
-    parsed = [_meaning(cell) for cell in cells]
     for name, known in COLUMNS.items():
         if name in given:
             continue  # what it is called was said
+        parsed = [_meaning(cell, name) for cell in cells]
         for place in (parsed.index(one) for one in known if one in parsed):
-            places.setdefault(name, (place, _factor(cells[place])))
+            places.setdefault(name, (place, _factor(cells[place], name)))
     return places
 
 
-def _split(cell: str) -> tuple[list[str], str]:
-    """The words of a heading, and its unit; a unit that is not known is one of its words."""
+def _split(cell: str, name: str) -> tuple[list[str], str]:
+    """The words of a heading, and its unit; a unit that is not one of this column is a word."""
+    units = _UNITS[name]
     match = _HEADING.match(cell.lower())
     words = re.findall(r"[a-z]+", match[1] if match else "")
     unit = (match[2] or "").strip() if match else ""
-    if unit not in _UNITS:
+    if unit not in units:
         # As in "Ft-AGL".
         parts = [one for one in re.split(r"[\s_-]+", unit) if one not in _BESIDES]
-        if len(parts) != 1 or parts[0] not in _UNITS:
+        if len(parts) != 1 or parts[0] not in units:
             return [*words, unit], ""
         unit = parts[0]
-    if not unit and len(words) > 1 and words[-1] in _UNITS:
+    if not unit and len(words) > 1 and words[-1] in units:
         unit = words.pop()
     return words, unit
 
 
-def _meaning(cell: str) -> str:
-    return "".join(one for one in _split(cell)[0] if one not in _BESIDES)
+def _meaning(cell: str, name: str) -> str:
+    return "".join(one for one in _split(cell, name)[0] if one not in _BESIDES)
 
 
-def _factor(cell: str) -> float:
-    return _UNITS[_split(cell)[1]]
+def _factor(cell: str, name: str) -> float:
+    return _UNITS[name][_split(cell, name)[1]]
 
 
 def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tuple[float, object]]:
@@ -187,15 +195,16 @@ def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tup
     ground = values[0]["height"]
     beat = told.heartbeat(dialect.MAV_TYPE_ROCKET, dialect.MAV_AUTOPILOT_GENERIC, True)
     beat_at = -math.inf
-    oldest = 0
-    for number, one in enumerate(values):
-        at, height = one["time"], one["height"] - ground
-        while values[oldest]["time"] < at - _SLOPE and oldest < number:
-            oldest += 1
+    before: deque[tuple[float, float]] = deque()
+    for at, one in steady(((one["time"], one) for one in values), remarks):
+        height = one["height"] - ground
+        before.append((at, height))
+        while before[0][0] < at - _SLOPE and len(before) > 1:
+            before.popleft()
         speed = one.get("vertical_speed", math.nan)
-        span = at - values[oldest]["time"]
+        span = at - before[0][0]
         if math.isnan(speed) and span > 0.0:
-            speed = (one["height"] - values[oldest]["height"]) / span
+            speed = (height - before[0][1]) / span
         if at - beat_at >= 1.0:
             beat_at = at
             out.add_change(at, beat)
@@ -204,7 +213,7 @@ def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tup
         )
         if math.isfinite(one.get("pressure", math.nan)):
             out.add(at, told.pressure(one["pressure"]))
-    return out.in_order(remarks)
+    return out.in_order()
 
 
 def _number(row: Sequence[str], place: int, factor: float) -> float:

@@ -6,13 +6,15 @@ endian, before each frame). What is damaged is passed over, as on a link.
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.autopilot import is_autopilot
 from chute_ros.protocol.mavlink.frames import MAGIC_V1, MAGIC_V2, FrameDecoder
-from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, without_gaps
+from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
+from chute_ros.tools.judge_log.stamps import steady
 from chute_ros.transport.regular_file import open_regular
 
 FORMAT = "MAVLink telemetry"
@@ -21,7 +23,8 @@ _TIME = struct.Struct(">Q")
 #: Bytes of a frame besides its payload, by its first byte; of a signature.
 _AROUND = {MAGIC_V1: 8, MAGIC_V2: 12}
 _SIGNATURE, _SIGNED = 13, 0x01
-#: Two frames of one log are at most so far apart, us: a time beyond it is damage.
+_US = 1e-6
+#: Two frames, of which the dialect does not know the first, are at most so far apart, us.
 _FURTHEST = 86_400 * 1_000_000
 
 
@@ -48,18 +51,14 @@ def read(path: Path) -> FlightLog:
     for _, message in own:
         if message.get_type() == "PARAM_VALUE":
             parameters[message.param_id] = message.param_value
-    begin = own[0][0]
-    told_of, newest = [], 0.0
-    for at, message in own:
-        newest = max(newest, (at - begin) * 1e-6)
-        if message.get_type() != "PARAM_VALUE":
-            told_of.append((newest, message))
+    told_of = [(at * _US, one) for at, one in own if one.get_type() != "PARAM_VALUE"]
     remarks = [f"{passed} damaged bytes were passed over"] if passed else []
     others = sorted({source for source, _ in beats} - {who})
     rest = ", ".join(f"{system}/{component}" for system, component in others)
     if rest:
         remarks.append(f"of autopilot {who[0]}/{who[1]} alone; besides it are {rest}")
-    messages = without_gaps(told_of, remarks)
+    messages = list(steady(told_of, remarks, boot_time=(_since_boot(one) for _, one in told_of)))
+    messages = [(at - messages[0][0], one) for at, one in messages]
     return FlightLog(path, FORMAT, beat.type, beat.autopilot, messages, parameters, True, remarks)
 
 
@@ -71,21 +70,31 @@ def _frames(data: bytes) -> tuple[list[tuple[int, tuple[int, int], Any]], int]:
     while at < end:
         size = _size(data, at + _TIME.size)
         (time,) = _TIME.unpack_from(data, at)
-        near = not found or abs(time - found[-1][0]) < _FURTHEST
         frames = []
-        if size and near:
-            frame = data[at + _TIME.size : at + _TIME.size + size]
-            frames = decoder.feed_datagram(frame, 0.0)
+        if size:
+            after = at + _TIME.size + size
+            frames = decoder.feed_datagram(data[at + _TIME.size : after], 0.0)
             # Of a message that the dialect does not know the frame is whole all the same.
-            following = at + 2 * _TIME.size + size
-            whole = frames or (following < len(data) and data[following] in _AROUND)
-            size = size if whole else 0
-        if not size or not near:
+            size = size if frames or _goes_on(data, after, time) else 0
+        if not size:
             at, passed = at + 1, passed + 1
             continue
         found += [(time, (one.system_id, one.component_id), one.message) for one in frames]
         at += _TIME.size + size
     return found, passed
+
+
+def _goes_on(data: bytes, at: int, before: int) -> bool:
+    """A frame begins here whose time is near that of the one before (us)."""
+    if at + _TIME.size >= len(data) or data[at + _TIME.size] not in _AROUND:
+        return False
+    (time,) = _TIME.unpack_from(data, at)
+    return bool(abs(time - before) < _FURTHEST)
+
+
+def _since_boot(message: Any) -> float:
+    """s by the autopilot's own clock; NaN: it does not tell."""
+    return (getattr(message, "time_boot_ms", 0) or math.nan) * 1e-3
 
 
 def _size(data: bytes, at: int) -> int:

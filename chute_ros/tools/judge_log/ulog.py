@@ -13,7 +13,7 @@ import contextlib
 import io
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.rotation import angles_of, quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
+from chute_ros.tools.judge_log.stamps import steady
 
 FORMAT = "PX4 ULog"
 MAGIC = b"ULog\x01\x12\x35"
@@ -30,6 +31,8 @@ _US = 1e-6
 _GAP = 0.05
 #: vehicle_status.arming_state.
 _ARMED = 2
+#: Among so many stamps of a topic a damaged one is seen.
+_OFTEN = 5
 _TOPICS = [
     *("vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_local_position"),
     *("vehicle_local_position_setpoint", "vehicle_global_position", "home_position"),
@@ -72,6 +75,7 @@ class _UlogTranslator:
 
     def __init__(self, ulog: Any) -> None:
         self._ulog, self._out = ulog, MessageLog()
+        self._remarks: list[str] = []
         self._parameters = {name: _plain(v) for name, v in ulog.initial_parameters.items()}
 
     def log(self, path: Path) -> FlightLog:
@@ -82,8 +86,7 @@ class _UlogTranslator:
         self._accelerations()
         self._batteries()
         vehicle_type = self._states()
-        remarks: list[str] = []
-        messages = self._out.in_order(remarks)
+        messages = list(steady(self._out.in_order(), self._remarks))
         return FlightLog(
             path,
             FORMAT,
@@ -91,7 +94,7 @@ class _UlogTranslator:
             dialect.MAV_AUTOPILOT_PX4,
             messages,
             self._parameters,
-            remarks=remarks,
+            remarks=self._remarks,
         )
 
     def _rows(self, topic: str, which: int = 0) -> Iterator[Row]:
@@ -100,9 +103,16 @@ class _UlogTranslator:
             if data.name == topic and data.multi_id == which:
                 names = [name for name in data.data if name != "timestamp"]
                 columns = [data.data[name].tolist() for name in names]
-                times = data.data["timestamp"].tolist()
+                times = self._times(data.data["timestamp"].tolist())
                 for time, *values in zip(times, *columns, strict=True):
-                    yield time * _US, dict(zip(names, values, strict=True))
+                    yield time, dict(zip(names, values, strict=True))
+
+    def _times(self, stamps: list[int]) -> list[float]:
+        """s. Nobody sets this clock, and a topic may rest for as long as nothing changes."""
+        times = [(stamp * _US, None) for stamp in stamps]
+        if len(times) >= _OFTEN:
+            times = list(steady(times, self._remarks, math.inf))
+        return [at for at, _ in times]
 
     def _attitudes(self) -> None:
         for at, row in self._rows("vehicle_attitude"):
@@ -114,34 +124,35 @@ class _UlogTranslator:
                 turned = [row[f"q_d[{k}]"] for k in range(4)]
             else:
                 names = ("roll_body", "pitch_body", "yaw_body")
-                turned = list(quaternion_of(*(row.get(n, math.nan) for n in names)))
+                angles = [row.get(name, math.nan) for name in names]
+                if not all(map(math.isfinite, angles)):
+                    continue
+                turned = list(quaternion_of(*angles))
             thrust = row.get("thrust", -row.get("thrust_body[2]", math.nan))
             if all(map(math.isfinite, turned)):
                 self._out.add(at, told.attitude_target(turned, thrust))
 
     def _positions(self) -> None:
         global_rows = list(self._rows("vehicle_global_position"))
-        home = next(iter(self._rows("home_position")), (0.0, {}))[1]
         homes = list(self._rows("home_position"))
+        home = homes[0][1] if homes else {}
         for at, row in homes:
+            if not row.get("valid_alt", True):
+                continue
             self._out.add_change(
                 at, told.home(row["alt"], row["lat"], row["lon"], row.get("z", 0.0))
             )
         times = [at for at, _ in global_rows]
         home_times = [at for at, _ in homes]
         for at, row in self._rows("vehicle_local_position"):
-            speed, height = -row["vz"], -row["z"]
-            self._out.add(at, told.local_position(height, speed))
+            speed = -row["vz"]
+            self._out.add(at, told.local_position(-row["z"], speed))
             number = bisect.bisect_right(times, at) - 1
-            if number < 0:
-                # Without a global position PX4 sends what it has: the height above its origin.
-                where, altitude = {}, math.nan
-            else:
-                where = global_rows[number][1]
-                altitude = where["alt"]
-                newest = bisect.bisect_right(home_times, at) - 1
-                base = homes[newest][1] if newest >= 0 else home
-                height = altitude - base["alt"] if base else height
+            # Without a global position PX4 sends what it has.
+            where = global_rows[number][1] if number >= 0 else {}
+            altitude = where.get("alt", math.nan)
+            newest = bisect.bisect_right(home_times, at) - 1
+            height = _height(row, altitude, homes[newest][1] if newest >= 0 else home)
             known = (where.get("lat", math.nan), where.get("lon", math.nan))
             self._out.add(at, told.position(height, speed, altitude, *known))
         for at, row in self._rows("vehicle_local_position_setpoint"):
@@ -176,7 +187,8 @@ class _UlogTranslator:
             self._out.add(at, told.battery(voltage, row.get("remaining", math.nan)))
 
     def _states(self) -> int:
-        vehicle_type = int(self._parameters.get("MAV_TYPE", dialect.MAV_TYPE_QUADROTOR))
+        told_type = self._parameters.get("MAV_TYPE", math.nan)
+        vehicle_type = int(told_type) if 0 <= told_type <= 255 else dialect.MAV_TYPE_QUADROTOR
         arming, flying = [], []
         for at, row in self._rows("vehicle_status"):
             vehicle_type = int(row.get("system_type", vehicle_type)) or vehicle_type
@@ -189,6 +201,14 @@ class _UlogTranslator:
         for at, in_air in _changes(flying, self._out.seconds()):
             self._out.add_change(at, told.landed(in_air))
         return vehicle_type
+
+
+def _height(row: Mapping[str, float], altitude: float, home: Mapping[str, float]) -> float:
+    """Above home, if it is valid; otherwise above the origin. row: of the local position."""
+    if "valid_alt" in home:
+        return home["z"] - row["z"] if home["valid_alt"] else -row["z"]
+    # Older logs do not tell whether it is valid.
+    return altitude - home["alt"] if home and math.isfinite(altitude) else -row["z"]
 
 
 def _changes(told_of: list[tuple[float, bool]], moments: list[float]) -> list[tuple[float, bool]]:
