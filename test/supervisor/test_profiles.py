@@ -293,7 +293,6 @@ def test_every_rule_has_its_story(name: str) -> None:
     told |= {"sinks fast under a canopy", "killed and falling", "ballistic"}
     told |= {"fall that its estimator does not tell", "off its command", "falls flat"}
     told |= {"spin that its estimator does not tell", "main overdue", "main late"}
-    told |= {"nothing out and low"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -517,33 +516,6 @@ def test_a_main_that_is_overdue_is_ordered(
     if fires:
         assert story.newest(D).rule == "main overdue"
         assert 90.0 < height < 150.0 - sinks
-
-
-@pytest.mark.parametrize("apogee", [63.0, 100.0, 130.0, 400.0])
-@pytest.mark.parametrize("fastest", [33.0, 46.0, 150.0])
-def test_with_nothing_out_low_above_the_ground_there_is_no_time_to_wait(
-    apogee: float, fastest: float
-) -> None:
-    """Given a weak boost, or one that tumbles as fast as a drogue lets it; and a flight computer
-    that fires nothing."""
-    story = Story(shipped("rocket")).ready().fly(1.0, height=apogee, vertical_speed=1.0)
-    height, speed = apogee, 0.0
-    while height > 0.0 and "DEPLOY" not in story.fired():
-        speed -= 0.1 * 9.81 * (1.0 - (speed / fastest) ** 2)
-        height += 0.1 * speed
-        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed)
-    assert story.fired() == ["KILL", "DEPLOY"]
-    assert height > -0.7 * speed, "as its time to the ground, s"
-
-
-@pytest.mark.parametrize("sinks", [12.0, 17.0])
-def test_what_comes_down_as_under_a_drogue_gets_no_other(sinks: float) -> None:
-    """Its flight computer never tells that it is out."""
-    story, height = Story(shipped("rocket")).ready().fly(1.0, height=400.0), 400.0
-    while height > 5.0:
-        height -= 0.1 * sinks
-        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=-sinks)
-    assert story.fired() == []
 
 
 def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told() -> None:

@@ -22,8 +22,8 @@ from chute_ros.tools.mcap_entries import McapEntries
 pytestmark = pytest.mark.xdist_group("to_rosbag2")
 ROOT = Path(__file__).parents[2]
 HINT = (
-    "to_rosbag2: play where no vehicle receives it: a recorded request or heartbeat is one to every "
-    "node in the same domain\n"
+    "to_rosbag2: play where no vehicle receives it: a recorded request or heartbeat is one to "
+    "every node in the same domain\n"
 )
 
 
