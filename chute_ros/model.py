@@ -263,11 +263,11 @@ class VehicleState:
 
     def aged(self, by: float) -> VehicleState:
         """The same picture, by seconds later."""
-        return replace(self, **{name: getattr(self, name) + by for name in _AGES})
+        return replace(self, **{name: getattr(self, name) + by for name in AGES})
 
 
 #: Fields of VehicleState that tell an age.
-_AGES = tuple(one.name for one in fields(VehicleState) if one.name.endswith("_age"))
+AGES = tuple(one.name for one in fields(VehicleState) if one.name.endswith("_age"))
 
 
 class Airframe(enum.Enum):

@@ -21,7 +21,8 @@ def remedy(error: ImportError) -> str:
         return f"{_NOT_BUILT}\n({error})"
     if missing.partition(".")[0] in _EXTRA:
         return f"{missing} is not installed: `pip install -r requirements/extra.in` brings it"
-    if missing:
+    # A module of ours that lacks a name is a mistake of ours.
+    if isinstance(error, ModuleNotFoundError) and missing and not missing.startswith("chute_ros"):
         return (
             f"{missing} is not installed: `rosdep install --from-paths src "
             "src/chute_ros/msg_defs --ignore-src` and "

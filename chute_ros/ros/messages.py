@@ -201,14 +201,12 @@ def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> P
 def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
     """As it is published on vehicle/state. stamp: when the picture was made."""
     message = VehicleState()
-    ages = []
     for field in dataclasses.fields(state):
         value = getattr(state, field.name)
-        if field.name.endswith("_age") and not math.isnan(value):
-            ages.append(value)
         setattr(message, field.name, int(value) if isinstance(value, enum.IntEnum) else value)
-    if ages:
-        message.header.stamp = before(stamp, min(ages))
+    known = [age for age in (getattr(state, name) for name in model.AGES) if not math.isnan(age)]
+    if known:
+        message.header.stamp = before(stamp, min(known))
     return message
 
 
@@ -218,8 +216,8 @@ def vehicle_state_from(message: VehicleState) -> model.VehicleState:
     values["link_state"] = _known(model.LinkState, values["link_state"])
     values["armed"] = _known(model.Armed, values["armed"])
     values["landed_state"] = _known(model.LandedState, values["landed_state"])
-    for name, value in values.items():
-        if name.endswith("_age") and value < 0.0:
+    for name in model.AGES:
+        if values[name] < 0.0:
             values[name] = model.NAN
     values["faults"] = tuple(values["faults"])
     return model.VehicleState(**values)

@@ -111,15 +111,7 @@ def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
     """By how much, and from when to when, the barometer's height changed in the last second."""
     if math.isnan(pressure_rate(config, state, now)):
         return NOT_TOLD
-    heights = state.heard.pressure_heights
-    since, until = heights[0][0], heights[-1][0]
-    usual = median(_rates(heights))
-    # As the propellers stop, a barometer in their wash tells some metres more within a moment.
-    risen = [
-        (usual if rate - usual > _STEP_UP else rate) * (after[0] - before[0])
-        for rate, (before, after) in zip(_rates(heights), pairwise(heights), strict=True)
-    ]
-    return Rise(sum(risen) / (until - since), since, until)
+    return _rise(state.heard.pressure_heights)
 
 
 def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
@@ -227,6 +219,18 @@ def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> 
     ):
         return math.nan
     return _rate(heights)
+
+
+@lru_cache(maxsize=16)  # as _rate
+def _rise(heights: tuple[tuple[float, float], ...]) -> Rise:
+    rates, since, until = _rates(heights), heights[0][0], heights[-1][0]
+    usual = median(rates)
+    # As the propellers stop, a barometer in their wash tells some metres more within a moment.
+    risen = [
+        (usual if rate - usual > _STEP_UP else rate) * (after[0] - before[0])
+        for rate, (before, after) in zip(rates, pairwise(heights), strict=True)
+    ]
+    return Rise(sum(risen) / (until - since), since, until)
 
 
 @lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from chute_ros import model
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import in_one_piece
-from chute_ros.ros import messages, qos
+from chute_ros.ros import messages, qos, two_clocks
 from chute_ros.ros.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chart import Mark, chart
@@ -33,7 +33,7 @@ class Director:
     def __init__(self, namespace: str, processes: Processes) -> None:
         self._processes = processes
         self._started = time.monotonic()
-        self._wall_ahead = time.time() - self._started
+        self._wall_ahead = two_clocks.wall_at(0.0) * 1e-9
         #: From then on times count from the failure; NaN: it has not come.
         self.failure_at = math.nan
         self.vehicle = VehicleState()

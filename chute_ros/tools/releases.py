@@ -133,10 +133,5 @@ def _motion(vehicle: list[tuple[float, VehicleState]], at: float) -> MotionThen:
     if not number:
         return MotionThen()
     when, state = vehicle[number - 1]
-    older = at - when
-    return MotionThen(
-        state.height,
-        state.height_age + older,
-        state.vertical_speed,
-        state.vertical_speed_age + older,
-    )
+    then = state.aged(at - when)
+    return MotionThen(then.height, then.height_age, then.vertical_speed, then.vertical_speed_age)

@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 
 import pytest
-from test_one_estimator import EVERY, Teller, deployed
-from test_two_origins import HIGH, up
+from test_one_estimator import EVERY, deployed
+from test_two_origins import HIGH, fall, falling_flat, up
 
 from chute_ros.supervisor.contradictions import GRAVITY
 
@@ -60,24 +60,11 @@ def test_a_barometer_that_leaves_the_wash_of_its_propellers_hides_no_tumble(wash
     assert begun * EVERY <= 1.3
 
 
-def flat(teller: Teller, lasts: float, fastest: float) -> float:
-    """It falls flat for so long, s; the height that is left as it is deployed, m, or NaN."""
-    height, speed = HIGH, 0.0
-    for _ in range(round(lasts / EVERY)):
-        force = GRAVITY * (speed / fastest) ** 2
-        told = {"height": height, "vertical_speed": speed + teller.noise(0.2), "tilt": 10.0}
-        teller.tell(**told, force=force, true_height=height)
-        if deployed(teller):
-            return height
-        speed -= EVERY * (GRAVITY - force)
-        height += EVERY * speed
-    return math.nan
-
-
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 @pytest.mark.parametrize("fastest", [10.0, 12.0, 14.0])
 def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(
     profile: str, fastest: float
 ) -> None:
     """Given a quadplane whose lift stops; nobody tells what was commanded."""
-    assert flat(up(profile), 4.0, fastest) > HIGH - 2.2 * fastest
+    took = fall(up(profile), fastest, tilt=10.0)
+    assert falling_flat(took, fastest)[0] < 2.2 * fastest

@@ -9,6 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_not_built import MISSING
+
+from chute_ros.not_installed import remedy
 
 #: Those that need messages, or links; the others run without.
 NEED_MESSAGES = [
@@ -22,18 +25,6 @@ NEED_MESSAGES = [
     "chute",
 ]
 NEED_LINKS = ["campaign", "compare", "judge_log", "conformance"]
-MISSING = """
-import sys
-
-
-class Missing:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] == "chute_msgs":
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-
-sys.meta_path.insert(0, Missing())
-"""
 
 
 def ended(tool: str, first: Path) -> list[str]:
@@ -61,7 +52,7 @@ def ended(tool: str, first: Path) -> list[str]:
 def test_where_the_messages_are_not_built_it_says_how_to_build_them(
     tool: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "sitecustomize.py").write_text(MISSING)
+    (tmp_path / "sitecustomize.py").write_text(MISSING.format(name="chute_msgs"))
     first, *lines, last = ended(tool, tmp_path)
     assert first.endswith(
         "chute_msgs cannot be imported: build both packages and source the result:"
@@ -79,3 +70,24 @@ def test_a_link_whose_package_was_removed_is_named(tool: str, tmp_path: Path) ->
     (line,) = ended(tool, tmp_path)
     assert line.startswith(f"{tool}: ")
     assert "pyro" in line
+
+
+@pytest.mark.parametrize(
+    ("error", "begins"),
+    [
+        (
+            ModuleNotFoundError("No module named 'serial'", name="serial"),
+            "serial is not installed",
+        ),
+        (ImportError("cannot import name 'Telem'", name="chute_msgs.msg"), "chute_msgs cannot be"),
+        (ImportError("cannot import name 'x' from 'chute_ros'", name="chute_ros"), ""),
+        (ModuleNotFoundError("No module named 'chute_ros.x'", name="chute_ros.x"), ""),
+        (ImportError("cannot import name 'x' from 'rclpy'", name="rclpy"), ""),
+    ],
+)
+def test_what_is_missing_is_told_and_a_mistake_of_ours_is_not_hidden(
+    error: ImportError, begins: str
+) -> None:
+    told = remedy(error)
+    assert told.startswith(begins)
+    assert bool(told) is bool(begins)

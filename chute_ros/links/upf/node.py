@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -18,7 +17,7 @@ from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.runtime import UpfRuntime
 from chute_ros.links.upf.services import UpfServices
 from chute_ros.protocol.dronecan.allocation import KeepTable
-from chute_ros.ros import diagnostics, messages, qos
+from chute_ros.ros import diagnostics, messages, qos, two_clocks
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.ros.kept_file import Newest
 from chute_ros.runtime.device import Summary
@@ -48,7 +47,7 @@ class UpfCanNode(DeviceNode):
         settings = settings_from(UpfParameters, self.values).runtime
         gives_ids = settings.link.allocator is not AllocatorUse.NO
         table = self._file.load() if gives_ids else {}
-        utc_offset = time.time() - time.monotonic()
+        utc_offset = two_clocks.wall_at(0.0) * 1e-9
         runtime = UpfRuntime(self.get_name(), settings, self, details_of)
         self.carry(runtime)
         link = UpfLink(config_from(settings.link, table, name, utc_offset), types)
