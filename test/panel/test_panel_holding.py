@@ -114,6 +114,22 @@ def test_a_burst_of_orders_by_a_script_is_one(fly, vehicles, page):
     assert orders(fly, vehicles, page) == 1
 
 
+def test_a_burst_that_a_busy_panel_obeys_slowly_is_one(fly, vehicles, page):
+    beat = int(page.locator(".pulse").text_content())
+    for _ in range(2):
+        page.evaluate(
+            """(beat) => [...document.querySelectorAll("button.hold")].filter(
+                (one) => one.textContent.includes("Reset"))[0].dispatchEvent(
+                    new CustomEvent("held", {detail: beat}))""",
+            beat,
+        )
+        # Given 1.1 s between the two, as a panel without a processor would count them.
+        page.wait_for_timeout(1100)
+    until(fly, lambda: vehicles.resets, page)
+    assert orders(fly, vehicles, page) == 1
+    assert "eset: NOT SENT: " in page.locator(".answers").inner_text()
+
+
 @pytest.mark.parametrize("beat", ["null", "NaN", "-1", "1e9", "'x'", "[1]", "undefined"])
 def test_an_order_without_a_beat_of_now_is_refused(fly, vehicles, page, beat):
     page.evaluate(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
 _MOST_ANSWERS = 6
 #: Who holds a button looks at a page that is no older, s.
 _SEEN_WITHIN = 2.0
-#: Nobody can hold a button twice in this time, s.
-_AGAIN_AFTER = 1.0
 _LONGEST_REASON = 200
 
 
@@ -39,8 +36,9 @@ class OrdersPart:
         self._node, self._namespace, self._request = node, namespace, request
         self._pulse = pulse
         self._text = ""
-        #: Name of an order -> when it was given last, monotonic s.
-        self._given: dict[str, float] = {}
+        #: Name of an order -> the beat that whoever gave it last had seen. Who holds the button once
+        #: more sees a later one (panel.js); a burst that was obeyed slowly does not.
+        self._given: dict[str, int] = {}
         if not node.settings.allow_commands:
             return
         with ui.element("section").classes("card orders"):
@@ -87,7 +85,7 @@ class OrdersPart:
             if self._pulse.age(event.args) > _SEEN_WITHIN:
                 self._tell(f"{text}: NOT SENT: the page was not connected; hold it again", "bad")
                 return
-            await self._give(make)
+            await self._give(make, event.args)
 
         button = ui.element("button").classes(f"hold tone-{tone}")
         with button:
@@ -101,18 +99,17 @@ class OrdersPart:
     def _person(self) -> Operator | None:
         return person_of(self._node, self._request)
 
-    async def _give(self, make: Callable[[str], Order]) -> None:
+    async def _give(self, make: Callable[[str], Order], beat: int) -> None:
         person = self._person()
         if person is None:
             self._tell("NOT SENT: log in again", "bad")
             return
         reason = plain(self._text).strip() or orders.NO_REASON
         order = make(f"{person.text}: {reason}")
-        now = time.monotonic()
-        if now < self._given.get(order.name, -math.inf) + _AGAIN_AFTER:
+        if beat <= self._given.get(order.name, 0):
             self._tell(f"{order.name}: NOT SENT: the same was given just now", "bad")
             return
-        self._given[order.name] = now
+        self._given[order.name] = beat
         line = self._tell(f"{order.name}: sent, no answer yet", "quiet")
         future = asyncio.wrap_future(self._node.order(self._namespace, order, person))
         await asyncio.wait({future}, timeout=ANSWER)
