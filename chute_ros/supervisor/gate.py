@@ -24,6 +24,8 @@ _FALLS_AT_MOST = 60.0
 OPERATOR = "operator"
 #: Where a person may deploy without force.
 _IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
+#: Why what falls after such a kill gets no deploy.
+_ALONE = "a person asked for the kill alone; safety/deploy releases"
 
 
 def against_person(config: SupervisorConfig, state: State, force: bool, now: float) -> str:
@@ -68,7 +70,7 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     if not in_flight and not ordered:
         return f"the vehicle is {state.stage.name}, not in flight"
     if state.stage is Stage.KILLING and _killed_alone(state):
-        return "a person asked for the kill alone; safety/deploy releases"
+        return _ALONE
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
         return "the vehicle says that it stands, and nothing contradicts it"
@@ -120,10 +122,11 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
 
 def _killed_alone(state: State) -> bool:
     """A person asked for the kill under way alone. One that came to nothing has stopped no motors,
-    and what falls later does not fall by it."""
+    and what falls later does not fall by it; what fell before falls on as they wanted."""
     kill = state.killing.kill
     in_vain = kill is not None and kill.given_up and not kill.confirmed
-    return state.killing.kill_only and not in_vain
+    falls_on = any(rule.denied == _ALONE for rule in state.rules.values())
+    return state.killing.kill_only and (falls_on or not in_vain)
 
 
 def _killed(state: State, now: float) -> bool:

@@ -150,6 +150,8 @@ def _vehicle_rests(turn: Turn) -> bool:
 
 
 def _cleared(turn: Turn, rule: Rule, evidence: RuleEvidence) -> RuleEvidence:
+    if evidence.denied and evidence.cleared():
+        evidence = replace(evidence, denied="")
     if not evidence.latched:
         return evidence
     by_itself = rule.clears is Clears.BY_ITSELF and evidence.cleared()

@@ -84,6 +84,25 @@ def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(
     assert "DEPLOY" in story.fired()
 
 
+def test_a_kill_alone_of_what_falls_is_followed_by_no_deploy_though_nobody_confirms_it() -> None:
+    """Given an autopilot without power, and a person who wants it to come down as it is."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=60.0)
+    story.at(2.0, i.KillRequest(1, "operator", "nobody below", kill_only=True))
+    for k in range(60):
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 160.0), "tilt": 100.0})
+    story.at(story.t, story.report(Action.KILL, Outcome.FAILED))
+    # Then not in the rest of the fall either.
+    for k in range(60, 100):
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 160.0), "tilt": 100.0})
+    assert story.alarms()
+    assert "DEPLOY" not in story.fired()
+    # Given that it is caught and flies on, when it falls anew, then the deploy follows.
+    story.fly(story.t + 15.0, height=100.0)
+    for k in range(30):
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 100.0), "tilt": 100.0})
+    assert "DEPLOY" in story.fired()
+
+
 UNKNOWN = math.nan
 
 
