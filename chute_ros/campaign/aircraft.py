@@ -28,6 +28,10 @@ _HANGS = 6.0
 #: From its arming until it leaves the ground, s: PX4 spools up for 1 s (COM_SPOOLUP_TIME) and
 #: then ramps up its thrust, ArduCopter waits for 2 s.
 _SPOOLS_UP = 2.0
+#: From a touch-down until its pilot disarms it, s.
+_DISARMED_AFTER = 2.0
+#: How high a flight before the one that is told of goes, m.
+_HOP = 8.0
 _FAILED_MOTORS = (Failure.MOTOR, Failure.SINK, Failure.GLIDE, Failure.STALL)
 #: So near to where it took off the ground may be, for all that anybody knows, m.
 _NEAR = 10.0
@@ -87,7 +91,7 @@ class Aircraft(Rig):
         plug = Plug(self.network, "autopilot", self.autopilot, is_for_devices)
         self.add_device(plug, self.autopilot.reboot)
         self.join_links()
-        self.physics = Physics(self.model, scenario.ground, self._moved)
+        self.physics = Physics(self.model, scenario.deck, self._moved)
         self.world.add(self.physics)
         for source in scenario.second_sources:
             self.add_source(source, self.model)
@@ -95,6 +99,7 @@ class Aircraft(Rig):
         self.spools_up = _SPOOLS_UP
         self._speed = 0.0
         self._left = self._flew = False
+        self._flights_before = scenario.flights - 1
         self._first_out = ""
 
     def make_autopilot(self, kind: AutopilotKind) -> CampaignAutopilot:
@@ -111,8 +116,24 @@ class Aircraft(Rig):
         self.world.post(now + self.spools_up, self._leave)
 
     def _leave(self, now: float) -> None:
-        self.autopilot.act(f"takeoff={self.scenario.height}")
+        scenario, first = self.scenario, self._flights_before > 0
+        self.autopilot.act(f"takeoff={_HOP if first else scenario.height}")
+        self.physics.ground = 0.0 if first else scenario.ground
         self.physics.lifts = self._left = True
+
+    def lands_first(self) -> bool:
+        if not self._flights_before:
+            return False
+        self._flights_before -= 1
+        self._left = False
+        self.autopilot.act("land")
+        return True
+
+    def _stand(self, now: float) -> None:
+        self.autopilot.disarm()
+        self.world.stir(self.plugs["autopilot"])
+        if not self._left:  # and it flies again
+            self._flew, self.landed = False, math.nan
 
     def is_up(self) -> bool:
         return self._left and (self._flew or self.scenario.stands) and not self.physics.lifts
@@ -135,7 +156,9 @@ class Aircraft(Rig):
             self.truth = truth
 
     def _begin_manoeuvre(self, now: float) -> None:
-        self.model.manoeuvre, self.model.flown_for = self.scenario.manoeuvre, 0.0
+        manoeuvre = self.model.manoeuvre = self.scenario.manoeuvre
+        self.model.flown_for = 0.0
+        self.model.slope = math.radians(manoeuvre.slope) if manoeuvre else 0.0
 
     def plan_one(self, fault: Fault, up: float) -> None:
         super().plan_one(fault, up)
@@ -171,6 +194,8 @@ class Aircraft(Rig):
         elif model.on_ground:
             if math.isnan(self.landed):
                 self.landed, self.landing_speed = now, self._speed
+                if model.armed and not model.motors_failed:
+                    self.world.post(now + _DISARMED_AFTER, self._stand)
         elif not carried and not self.truth.falls and math.isnan(self.released):
             self.truth = observe(model, now)
         if self.truth.falls:

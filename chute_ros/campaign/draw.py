@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.draw_missions import on_a_mission
 from chute_ros.campaign.draw_world import SETTLED, in_the_world
 from chute_ros.campaign.scenario import (
     PROFILES,
@@ -100,7 +101,7 @@ def draw(seed: int) -> Scenario:
     if rocket:
         return drawn
     # Drawn last: a flight without one stays as it is.
-    return _with_second_source(chance, in_the_world(chance, drawn), around)
+    return _with_second_source(chance, on_a_mission(in_the_world(chance, drawn)), around)
 
 
 def _vehicle(chance: random.Random, seed: int) -> str:
@@ -172,7 +173,7 @@ def _with_second_source(chance: random.Random, drawn: Scenario, around: float) -
     faults = drawn.faults
     if chance.random() < _SECOND_FAULT:
         faults = (*faults, _second_fault(chance, chance.choice(sources), around))
-    high = chance.random() < _WITH_SECOND_HIGH and not drawn.stands
+    high = chance.random() < _WITH_SECOND_HIGH and not (drawn.stands or drawn.lands)
     height = round(chance.uniform(*_HIGH), 1) if high else drawn.height
     return replace(drawn, vehicle_sources=order, faults=faults, height=height)
 

@@ -80,7 +80,7 @@ def _on_the_ground(chance: random.Random, drawn: Scenario) -> Scenario:
     end = round(begin + lasts, 3)
     fault = EstimatorFault(how, round(begin, 3), end, round(strength, 2))
     stands = replace(drawn, height=0.0, gusts=0.0, person=None, aps=False)
-    return _with_one_wrong(stands, fault)
+    return with_one_wrong(stands, fault)
 
 
 def _autopilot(chance: random.Random, profile: str) -> Autopilot:
@@ -158,7 +158,7 @@ def _with_estimator(chance: random.Random, drawn: Scenario) -> Scenario:
     lasts = chance.uniform(2.0, 7.0)
     strength = 0.0 if how == "hovers" else round(strength, 2)
     fault = EstimatorFault(how, begin, round(begin + lasts, 3), strength)
-    return _with_one_wrong(drawn, fault)
+    return with_one_wrong(drawn, fault)
 
 
 def _manoeuvres(failure: Failure) -> float:
@@ -192,15 +192,21 @@ def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:
         return replace(drawn, failure_at=round(begin + chance.uniform(0.2, 3.0), 3))
     if chance.random() >= _WRONG_SENSOR:
         return drawn
+    return with_one_wrong(drawn, wrong_sensor(chance, drawn, begin, begin + 3.0))
+
+
+def wrong_sensor(
+    chance: random.Random, drawn: Scenario, begin: float, latest: float
+) -> SensorFault:
+    """Any of its autopilot's, from about begin to latest on, s."""
     sensors = sensors_of(drawn.vehicle)
     sensor = chance.choice(list(sensors))
-    wrong = max(SETTLED, begin + chance.uniform(-0.5, 3.0))
+    wrong = max(SETTLED, begin + chance.uniform(-0.5, latest - begin))
     end = round(wrong + chance.uniform(0.5, 4.0), 3)
-    fault = SensorFault(sensor, chance.choice(sensors[sensor]), round(wrong, 3), end)
-    return _with_one_wrong(drawn, fault)
+    return SensorFault(sensor, chance.choice(sensors[sensor]), round(wrong, 3), end)
 
 
-def _with_one_wrong(drawn: Scenario, fault: SensorFault | EstimatorFault) -> Scenario:
+def with_one_wrong(drawn: Scenario, fault: SensorFault | EstimatorFault) -> Scenario:
     """Of all that tells of the vehicle this is wrong, and nothing else."""
     others = [one for one in drawn.faults if not isinstance(one, SensorFault)]
     return replace(drawn, faults=(*others[: MOST_FAULTS - 1], fault))

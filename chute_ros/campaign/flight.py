@@ -32,6 +32,9 @@ _PATIENCE, _AGAIN = 2.0, 0.5
 _MOST_CALLS = 12
 #: What falls is on the ground by then, s.
 _FALLS = 30.0
+#: So long after it came to the ground nothing happens to it any more, and so long after a landing;
+#: and from its take-off until a flight before this one may be followed by it, s.
+_LIES, _STANDS, _FLIGHT_BEFORE = 1.0, 5.0, 30.0
 
 
 @dataclass(kw_only=True)
@@ -115,6 +118,8 @@ class Flight:
         self._arming: PersonCall | None = None
         self._person = PersonCall(self.rig, self._wish)
         self.up = self._took_off = math.nan
+        #: That were begun.
+        self._flights = 0
         self.rig.world.post(_FIRST_LOOK, self._look)
 
     def _wish(self, token: int) -> i.Input:
@@ -127,14 +132,15 @@ class Flight:
     def run(self) -> Flown:
         """Live through it."""
         rig, scenario = self.rig, self.scenario
-        rig.world.run(_READY_WITHIN, lambda: not math.isnan(self._took_off))
+        ready_within = _READY_WITHIN + _FLIGHT_BEFORE * (scenario.flights - 1)
+        rig.world.run(ready_within, lambda: self._flights >= scenario.flights)
         if not math.isnan(self._took_off):
             rig.world.run(self._took_off + _UP_WITHIN, lambda: not math.isnan(self.up))
         if not math.isnan(self.up):
             happens = [scenario.failure_at, scenario.apogee_at + 1.0]
             happens += map(_end_of, scenario.faults)
             if scenario.manoeuvre is not None:
-                happens.append(scenario.manoeuvre.begin + scenario.manoeuvre.lasts + 2.0)
+                happens.append(scenario.manoeuvre.over_by)
             if scenario.person is not None:
                 happens.append(scenario.person.at)
             quiet = self.up + max(happens) + _FOLLOWED
@@ -151,13 +157,19 @@ class Flight:
             if self._may_fly(now):
                 rig.take_off(now)
                 self._took_off = now
+                self._flights += 1
         elif rig.is_up() and rig.sees_flight:
-            self.up = now + (0.0 if self.scenario.burn else _SETTLES)
-            rig.plan(self.up)
-            if self.scenario.person is not None:
-                rig.world.post(self.up + self.scenario.person.at, self._person.begin)
-            return
+            if not rig.lands_first():
+                self._is_up(now)
+                return
+            self._took_off, self._arming = math.nan, None
         rig.world.post(now + _LOOKS, self._look)
+
+    def _is_up(self, now: float) -> None:
+        self.up = now + (0.0 if self.scenario.burn else _SETTLES)
+        self.rig.plan(self.up)
+        if self.scenario.person is not None:
+            self.rig.world.post(self.up + self.scenario.person.at, self._person.begin)
 
     def _may_fly(self, now: float) -> bool:
         if not self.rig.is_ready:
@@ -178,7 +190,7 @@ class Flight:
         """It is down, or hangs under its canopy for longer than anybody would fire again."""
         rig = self.rig
         now = rig.world.now
-        if now > rig.landed + 1.0:
+        if now > rig.landed + (_STANDS if self.scenario.lands else _LIES):
             return True
         if not math.isnan(rig.released) and self._is_carried():
             return now > max(

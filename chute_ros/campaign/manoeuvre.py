@@ -9,6 +9,9 @@ from typing import NamedTuple
 
 from chute_ros.sim.flight import GRAVITY
 
+#: A landing comes down so far with the speed of its touch-down, m.
+_LAST = 3.0
+
 
 class ManoeuvreMotion(NamedTuple):
     """m/s up, rad, specific force in m/s^2."""
@@ -20,19 +23,42 @@ class ManoeuvreMotion(NamedTuple):
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """kind: flip (amount: degrees a second), throw (s without thrust), dive (degrees from upright)
-    or descent (m/s); begin: s after it is up; lasts: s, of a dive or descent; sink: m/s, of a
-    dive."""
+    """kind: flip (amount: degrees a second), throw (s without thrust), dive (degrees from
+    upright), descent (m/s), transition (degrees, from hovering to wings or back) or landing (m/s
+    as it touches down); begin: s after it is up; lasts: s, and of a landing until it slows down to
+    amount; sink: m/s, of a dive, a transition and a landing until then; slope: degrees, of the
+    ground on which it lands."""
 
     kind: str
     amount: float
     begin: float
     lasts: float = 0.0
     sink: float = 0.0
+    slope: float = 0.0
+
+    @property
+    def lands(self) -> bool:
+        """It ends on the ground."""
+        return self.kind == "landing"
+
+    @property
+    def over_by(self) -> float:
+        """s after it is up."""
+        ends = 1.0 + (_LAST + 1.0) / self.amount if self.lands else 2.0
+        return self.begin + self.lasts + ends
 
     def at(self, passed: float) -> ManoeuvreMotion | None:
         """What it does so long after its begin, s; None: it is over."""
         return _FLOWN[self.kind](self, passed)
+
+
+def landing(
+    clearance: float, sink: float, touches: float, begin: float, slope: float = 0.0
+) -> Manoeuvre:
+    """From so high above the ground, m, with these, m/s, until it slows down and as it touches."""
+    # The first second is half as fast, and so it slows down.
+    lasts = max(1.0, (clearance - _LAST - (sink + touches) / 2.0) / sink + 0.5)
+    return Manoeuvre("landing", touches, begin, round(lasts, 2), sink, slope)
 
 
 def _flip(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
@@ -68,6 +94,24 @@ def _descent(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     return _stopped(-one.amount, passed - one.lasts, 1.0)
 
 
+def _transition(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
+    """It leans forward and sinks until its wings carry it, or rises as it leans back."""
+    if passed >= one.lasts:
+        return None
+    share = math.sin(math.pi * passed / one.lasts)
+    push = one.sink * math.pi / one.lasts * math.cos(math.pi * passed / one.lasts)
+    return ManoeuvreMotion(-one.sink * share, math.radians(one.amount) * share, GRAVITY - push)
+
+
+def _landing(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
+    """Down, slower before the ground, and on until it is there."""
+    if passed < one.lasts:
+        return ManoeuvreMotion(-one.sink * min(1.0, passed), 0.1, GRAVITY)
+    slowed = min(1.0, passed - one.lasts)
+    braked = one.sink - one.amount if slowed < 1.0 else 0.0
+    return ManoeuvreMotion(-one.sink + slowed * (one.sink - one.amount), 0.05, GRAVITY + braked)
+
+
 def _stopped(speed: float, passed: float, within: float) -> ManoeuvreMotion | None:
     """From a speed to none."""
     if passed >= within:
@@ -80,4 +124,6 @@ _FLOWN: dict[str, Callable[[Manoeuvre, float], ManoeuvreMotion | None]] = {
     "throw": _throw,
     "dive": _dive,
     "descent": _descent,
+    "transition": _transition,
+    "landing": _landing,
 }

@@ -135,6 +135,10 @@ class Rig(Course, ABC):
     def is_up(self) -> bool:
         """The times of the scenario begin."""
 
+    def lands_first(self) -> bool:
+        """It was up on a flight before the one that is told of, and lands now."""
+        return False
+
     @abstractmethod
     def fail(self, now: float) -> None:
         """What fails, fails."""

@@ -250,6 +250,10 @@ class Scenario:
     unheld: Descent | None = None
     canopy: Canopy = Canopy()
     autopilot: Autopilot = Autopilot()
+    #: Of so many, with a reset of nothing in between, this is the last.
+    flights: int = 1
+    #: What it takes off from moves up and down by so much, m.
+    deck: float = 0.0
     #: What flies instead of the small model, until our side acts.
     tape: Taped | None = None
 
@@ -257,6 +261,11 @@ class Scenario:
     def stands(self) -> bool:
         """It never leaves the ground, armed as it is."""
         return not self.is_rocket and self.height == 0.0
+
+    @property
+    def lands(self) -> bool:
+        """It comes down as its pilot wants."""
+        return self.manoeuvre is not None and self.manoeuvre.lands
 
     @property
     def is_rocket(self) -> bool:

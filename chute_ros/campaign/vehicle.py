@@ -13,9 +13,15 @@ from chute_ros.campaign.sensors import Sensors
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
 from chute_ros.sim.autopilot_kinds import AutopilotKind, Termination
-from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.flight import GRAVITY
 from chute_ros.sim.gusts import GustyModel
 
+#: A skid or a wheel throws it up with so much of the speed of its touch-down.
+_BOUNCES = 0.3
+#: What has touched down is flown to below the ground, m: it does not hover above it.
+_LET_DOWN = 1.0
+#: A deck moves up and down once in this, s; degrees by which each m of that leans it at most.
+_SWELL, _LEANS = 7.0, 5.0
 #: It is carried up to where the flight begins, by more than any vehicle climbs, and by less than a
 #: height jumps, m/s.
 _LIFT = 80.0
@@ -28,6 +34,8 @@ class WindyModel(GustyModel):
     #: What it flies now, and since when, s.
     manoeuvre: Manoeuvre | None = None
     flown_for: float = 0.0
+    #: Of the ground on which it stands, rad.
+    slope: float = 0.0
 
     @property
     def lean(self) -> float:
@@ -41,8 +49,21 @@ class WindyModel(GustyModel):
             self.vertical_speed, self.roll, self.acceleration = flown
             self.height += self.vertical_speed * dt
             self.target_height = self.height
+            if self.on_ground:
+                self._touch_down(-self.vertical_speed, dt)
             return
         super().step(dt)
+
+    def _touch_down(self, sink: float, dt: float) -> None:
+        """It bounces off, is let down, and stands."""
+        self.height, self.target_height = self.ground, self.ground - _LET_DOWN
+        self.vertical_speed = _BOUNCES * sink
+        self.acceleration = GRAVITY + (1.0 + _BOUNCES) * sink / dt
+
+    def _turn(self, dt: float) -> None:
+        super()._turn(dt)
+        if self.on_ground:
+            self.roll = self.slope
 
     def _manoeuvre(self, dt: float) -> ManoeuvreMotion | None:
         """What it is told to fly; whoever is out of control does not."""
@@ -62,28 +83,41 @@ def lift_time(height: float) -> float:
 
 
 class Physics:
-    """Moves the vehicle on, whoever hangs or has no power. ground: under it once it is up, m above
-    its take-off; moved: called after each step."""
+    """Moves the vehicle on, whoever hangs or has no power. deck: what it takes off from moves up
+    and down by so much, m; moved: called after each step."""
 
-    def __init__(self, model: FlightModel, ground: float, moved: Callable[[float], None]) -> None:
-        self.model, self._ground, self._moved = model, ground, moved
+    def __init__(self, model: WindyModel, deck: float, moved: Callable[[float], None]) -> None:
+        self.model, self._deck, self._moved = model, deck, moved
+        #: Under it once it is up, m above its take-off.
+        self.ground = 0.0
         self._at = STEP
-        #: It is being carried to its height.
-        self.lifts = False
+        #: It is being carried to its height, and was.
+        self.lifts = self._is_off = False
 
     def update(self, now: float) -> None:
         """One step."""
         self._at += STEP
         model = self.model
         if self.lifts:
+            self._is_off = True
             model.height = min(model.target_height, model.height + _LIFT * STEP)
             model.vertical_speed = 0.0
             self.lifts = model.height < model.target_height
             if not self.lifts:
-                model.ground = self._ground
+                model.ground = self.ground
         else:
             model.step(STEP)
+            if self._deck and not self._is_off:
+                self._heave(now)
         self._moved(now)
+
+    def _heave(self, now: float) -> None:
+        model, turns = self.model, 2.0 * math.pi / _SWELL
+        up, speed = math.sin(turns * now), turns * math.cos(turns * now)
+        model.height = model.ground = self._deck * up
+        model.vertical_speed = self._deck * speed
+        model.acceleration = GRAVITY - self._deck * turns**2 * up
+        model.roll = math.radians(_LEANS * self._deck) * up
 
     def next_deadline(self) -> float:
         """Of the next step."""
@@ -157,6 +191,10 @@ class CampaignAutopilot(AutopilotDevice):
         if self._sensors.lies("disarmed", self.now):
             message.base_mode = 0
         return message
+
+    def disarm(self) -> None:
+        """As its pilot does after a landing."""
+        self._set_armed(False)
 
     def _end_flight(self) -> None:
         super()._end_flight()

@@ -31,9 +31,12 @@ The autopilots answer, refuse, terminate and report their commands like PX4, Ard
 or none of them (PX4 orders a release itself when it terminates the flight). Home is reset or
 drifts in flight, and moves with a vehicle that is disarmed in the air. The ground differs from the
 take-off: beside a roof, in a valley, on a hill. An estimator is wrong but consistent,
-in height, speed and attitude together. Flips, dives, throws and fast descents are flown on
-purpose, with one sensor wrong or none. Some vehicles lose a part of their thrust and sink upright;
-aeroplanes glide, stall, spin and dive. Some canopies open late, or tangle and do not carry.
+in height, speed and attitude together. Flips, dives, throws, fast descents, landings (soft and
+hard, on a slope, with a bounce) and transitions from rotors to wings and back are flown on
+purpose, with one sensor wrong or none. Some take off from a deck that moves, some fly for the
+second time without a reset, some autopilots restart again and again. Some vehicles lose a part of
+their thrust and sink upright; aeroplanes glide, stall, spin and dive. Some canopies open late, or
+tangle and do not carry.
 
 The truth comes from the flight models: the moment from which only a parachute helps (a rocket:
 from which it comes down and no drogue will come by itself), and the last moment at which a release

@@ -36,8 +36,8 @@ class OrdersPart:
         self._node, self._namespace, self._request = node, namespace, request
         self._pulse = pulse
         self._text = ""
-        #: Name of an order -> the beat that whoever gave it last had seen. Who holds the button once
-        #: more sees a later one (panel.js); a burst that was obeyed slowly does not.
+        #: Name of an order -> the beat that whoever gave it last had seen. Who holds the button
+        #: once more sees a later one (panel.js); a burst that was obeyed slowly does not.
         self._given: dict[str, int] = {}
         if not node.settings.allow_commands:
             return
