@@ -76,6 +76,8 @@ DERIVED: dict[str, tuple[str, ...]] = {
     SPEED_ERROR: (PRESSURE_ALTITUDE, VERTICAL_SPEED),
     FORCE_ERROR: (ACCELERATION, VERTICAL_SPEED, TILT),
 }
+#: Measurement -> the other one of which its source has made it: as much in doubt as that.
+MADE_OF = {"attitude_error": TILT, "sink_beyond_target": VERTICAL_SPEED}
 
 
 #: The unit of each, for people.

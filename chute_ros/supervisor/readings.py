@@ -26,6 +26,7 @@ from chute_ros.supervisor.measurements import (
     FELT_FALL,
     FORCE_ERROR,
     HEIGHT,
+    MADE_OF,
     PRESSURE_ALTITUDE,
     SPEED_ERROR,
     VERTICAL_ACCELERATION,
@@ -89,7 +90,12 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
         return ""
     if PARTS.get(name, name) in state.heard.disputed:
         return "another source reported otherwise"
-    return state.measured(name).doubt(name, now)
+    known, part = state.measured(name), MADE_OF.get(name)
+    why = known.doubt(name, now)
+    if why or part is None or state.measured(part).source != known.source:
+        return why
+    why = doubt(state, part, state.measured(part).value, now)
+    return f"{part}: {why}" if why else ""
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
