@@ -256,7 +256,7 @@ class VehicleState:
     uptime: float = NAN  # s
     reboot_count: int = 0
     rebooted_in_flight: bool = False
-    #: After a restart in flight: height counts from the same place as before it.
+    #: After a restart in flight of the autopilot: height counts from the same place as before it.
     height_holds: bool = False
     #: Why this vehicle must not take off, as its source says it, in words.
     faults: tuple[str, ...] = ()

@@ -201,7 +201,9 @@ class VehicleMerge:
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,
-            height_holds=self._vehicle.height_holds,
+            # The height of another source has not started anew.
+            height_holds=self._vehicle.height_holds
+            or self._source("height", now) not in (None, *AUTOPILOTS),
             faults=self._faults(now),
             **fields,
         )

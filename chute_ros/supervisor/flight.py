@@ -20,7 +20,13 @@ from chute_ros.supervisor.measurements import (
     TILT,
     VERTICAL_SPEED,
 )
-from chute_ros.supervisor.readings import measured, pressure_height, pressure_rate, unusable
+from chute_ros.supervisor.readings import (
+    height_lost,
+    measured,
+    pressure_height,
+    pressure_rate,
+    unusable,
+)
 
 if TYPE_CHECKING:  # both hold rules, whose conditions are found here
     from chute_ros.supervisor.config import SupervisorConfig
@@ -95,7 +101,7 @@ def low_at(config: SupervisorConfig, state: State, falls: bool, now: float) -> f
     known, limit = state.measured(HEIGHT), config.profile.low_height
     height = min(known.value, known.before_jump) if known.has_jumped(now) else known.value
     # Far below the take-off it says nothing of the ground beneath.
-    tells = not state.flight.rebooted and height >= -limit
+    tells = not height_lost(state) and height >= -limit
     if not state.flight.airborne or not tells or limit <= 0.0:
         return math.inf
     ground = above_its_ground(state, height)

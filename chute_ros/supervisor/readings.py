@@ -58,7 +58,7 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == CLIMB_RATE:
         rate = pressure_rate(config, state, now)
         return (rate, "") if not math.isnan(rate) else _estimated_rate(config, state, now)
-    if name == HEIGHT and _height_lost(state):
+    if name == HEIGHT and height_lost(state):
         return math.nan, _HEIGHT_LOST
     if name == VERTICAL_ACCELERATION:
         return _vertical_acceleration(config, state, now)
@@ -171,12 +171,13 @@ def samples(config: SupervisorConfig, state: State, name: str, value: float, now
     return state.measured(told).count
 
 
-def _height_lost(state: State) -> bool:
+def height_lost(state: State) -> bool:
+    """What tells it started anew in flight, and counts from wherever it was then."""
     return state.flight.rebooted and not state.heard.vehicle.height_holds
 
 
 def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
-    if _height_lost(state):
+    if height_lost(state):
         return math.nan, _HEIGHT_LOST
     return _rate_of(config, state, HEIGHT, now)
 

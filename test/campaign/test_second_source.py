@@ -100,6 +100,17 @@ def test_a_second_source_that_was_killed_tells_again() -> None:
     assert end.released < end.truth.latest
 
 
+@pytest.mark.parametrize("sources", [(ODOMETRY, VEHICLE_STATE), WITH_ODOMETRY], ids=str)
+def test_beside_a_roof_the_height_of_another_source_outlives_a_restart(sources) -> None:
+    """Given an autopilot that restarts 6 m above a roof, and again and again as it falls past it,
+    when odometry tells how far, then the parachute is released."""
+    again = (Stop("autopilot", 2.0 + 1.5 * k, 0.9, dies=True) for k in range(3))
+    how = {"vehicle_sources": sources, "height": 6.0, "ground": -90.0}
+    end = flown(Failure.REBOOT, *again, **how)
+    assert judge(end).count is Count.CORRECT
+    assert end.release_height < -9.0
+
+
 def test_a_power_failure_that_a_second_source_told_of_is_no_excuse() -> None:
     good = flown(Failure.POWER, vehicle_sources=WITH_ODOMETRY, height=110.0)
     late = {"landed": good.truth.latest + 1.0, "landing_speed": 20.0}

@@ -46,6 +46,21 @@ def test_what_vehicle_state_says_is_told_until_it_forgets_it_or_is_lost():
     assert one.state(30.25).height_age == 0.25, "nothing is younger than new"
 
 
+@pytest.mark.parametrize(
+    ("source", "holds"), [("odometry", True), ("mavros", False), ("vehicle/state", False)]
+)
+def test_a_restart_of_the_autopilot_is_none_of_a_height_that_another_tells(source, holds):
+    """MAVROS tells the autopilot's own."""
+    one = merge(source, *({"vehicle/state"} - {source}))
+    one.hear_state(VehicleState(height=3.0, height_age=0.0), 10.0)
+    if source != "vehicle/state":
+        one.hear(source, {"height": (8.0,)}, 10.0)
+    anew = {"reboot_count": 1, "rebooted_in_flight": True}
+    one.hear_state(VehicleState(height=0.0, height_age=0.0, **anew), 10.1)
+    state = one.state(10.1)
+    assert (state.rebooted_in_flight, state.height_holds) == (True, holds)
+
+
 def told_at(one, *rates, until=20.0):
     """The faults at the end, of an IMU whose parts come at these rates (Hz) from 10 s on, beside
     an autopilot at 10 Hz."""
