@@ -10,9 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import dataclass
 from statistics import median
+
+from chute_ros.protocol.boot_clock import REBOOT_JUMP_MS
 
 #: Only so old messages are looked at, s, and so many; and no more often than this, s.
 WINDOW, _MOST, _EACH_TIME = 15.0, 1000, 0.5
@@ -65,8 +66,11 @@ class Twins:
         return now - self._found_at < OVER_AFTER
 
     def by_turns(self, now: float) -> bool:
-        """Two clocks came by turns just now: a restart may only seem to be one."""
-        return _turns(one for one in self._sights if now - one.at <= _GONE) > 1
+        """Two clocks came by turns just now: a restart may only seem to be one. What comes out of
+        order is no other clock until a restart could look like it."""
+        offsets = [one.offset for one in self._sights if now - one.at <= _GONE]
+        turns = [abs(a - b) * 1000.0 > REBOOT_JUMP_MS for a, b in itertools.pairwise(offsets)]
+        return sum(turns) > 1
 
     def doubt(self, who: str, now: float) -> str:
         """That who, two of them, are there, and what to do about it; empty: they are not."""
@@ -120,33 +124,37 @@ class Twins:
         both = {one.kind for one in sights if one.behind}
         sights = [one for one in sights if one.kind in both]
         # Before the second clock was heard the first one was ahead, whichever of them it is.
-        sights = list(itertools.dropwhile(lambda one: not one.behind, sights))
-        ahead = [one.offset for one in sights if not one.behind]
-        behind = [one.offset for one in sights if one.behind]
-        if min(len(ahead), len(behind)) < _EACH or _turns(sights) < _TURNS:
-            return
-        if max(one.at for one in sights if not one.behind) - sights[0].at < _GONE:
-            return
-        if max(_spread(ahead), _spread(behind)) > _IN_STEP:
+        known = list(itertools.dropwhile(lambda one: not one.behind, sights))
+        ahead = [one.offset for one in known if not one.behind]
+        behind = [one.offset for one in known if one.behind]
+        if min(len(ahead), len(behind)) < _EACH:
             return
         pair = median(ahead), median(behind)
-        if abs(pair[0] - pair[1]) < _CLOSEST:
+        is_first = [abs(one.offset - pair[0]) < abs(one.offset - pair[1]) for one in sights]
+        first = list(itertools.compress(sights, is_first))
+        second = list(itertools.compress(sights, (not one for one in is_first)))
+        if min(len(first), len(second)) < _EACH:
             return
-        if abs(pair[0] - pair[1]) < _LATEST:
+        # A clock that a restart has ended came before the other one, and comes no more.
+        together = min(first[-1].at, second[-1].at) - max(first[0].at, second[0].at)
+        turns = sum(a is not b for a, b in itertools.pairwise(is_first))
+        if together < _GONE or turns < _TURNS:
+            return
+        apart, spreads = abs(pair[0] - pair[1]), (_spread(first), _spread(second))
+        # What comes late of one clock is anywhere in between; two are where they are.
+        if max(spreads) > _IN_STEP or apart < max(_CLOSEST, sum(spreads)):
+            return
+        if apart < _LATEST:
+            fewer, more = sorted((len(first), len(second)))
             copies = sum(now - at <= WINDOW for at in self._copies)
-            if len(behind) < _SHARE * len(ahead) or copies > _COPIES * len(behind):
+            if fewer < _SHARE * more or copies > _COPIES * fewer:
                 return
         self._found_at = now
         self._ours, self._other = sorted(pair, key=lambda one: abs(one - self._ours))
 
 
-def _turns(sights: Iterable[_Sight]) -> int:
-    """How often it was the other clock's turn."""
-    return sum(a.behind is not b.behind for a, b in itertools.pairwise(sights))
-
-
-def _spread(offsets: list[float]) -> float:
-    """Of all but the outermost tenths: when the second clock was new some were of the other."""
-    cut = max(1, len(offsets) // 10)
-    kept = sorted(offsets)[cut:-cut]
+def _spread(sights: list[_Sight]) -> float:
+    """Of the offsets of all but the outermost tenths, s."""
+    cut = max(1, len(sights) // 10)
+    kept = sorted(one.offset for one in sights)[cut:-cut]
     return kept[-1] - kept[0]
