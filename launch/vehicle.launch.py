@@ -24,6 +24,7 @@ from chute_ros.tools.launch_checks import (
     check_links,
     check_vehicle,
     checked,
+    place_of,
 )
 from launch import LaunchContext, LaunchDescription
 
@@ -38,7 +39,7 @@ def _nodes(context: LaunchContext) -> list:
     parachute = LaunchConfiguration("parachute").perform(context)
     namespace = LaunchConfiguration("namespace").perform(context)
     # An enclave has the name of its node, with the namespace.
-    place = "/".join(["", *filter(None, namespace.split("/"))])
+    place = place_of(context, namespace)
     kinds = [links()[link] for link in vehicles()[parachute].links]
     given = {
         link: LaunchConfiguration(kind.argument.name).perform(context)

@@ -379,11 +379,19 @@ def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys
 
 
 @pytest.mark.parametrize(
-    ("namespace", "place"), [("", ""), ("drone1", "/drone1"), ("/fleet/drone1", "/fleet/drone1")]
+    ("pushed", "namespace", "place"),
+    [
+        (None, "", ""),
+        (None, "drone1", "/drone1"),
+        (None, "/fleet/drone1", "/fleet/drone1"),
+        ("/fleet", "drone1", "/fleet/drone1"),
+    ],
 )
-def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(namespace, place, monkeypatch):
+def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(
+    pushed, namespace, place, monkeypatch
+):
     (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
-    given = {"parachute": "both", "namespace": namespace}
+    given = {"parachute": "both", "namespace": namespace, "pushed": pushed}
     for enclaves in ("true", "false"):
         made = made_by(vehicle, monkeypatch, **given, enclaves=enclaves)
         nodes = [one.options for one in made if "executable" in one.options]
