@@ -333,9 +333,15 @@ def test_a_vehicle_is_heard_on_its_own_computer_unless_it_is_said_otherwise(
     space["generate_launch_description"]()
     (argument,) = [one for one in Recorded.made if one.args[:1] == ("range",) and one.options]
     assert argument.options["default_value"] == who
-    (variable,) = [one for one in Recorded.made if type(one).__name__ == "SetEnvironmentVariable"]
-    assert variable.args[0] == "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    assert variable.args[1].args == ("range",)
+
+
+def test_the_range_is_of_the_vehicles_nodes_alone(monkeypatch):
+    """Not of what an including launch file starts after them."""
+    nodes = nodes_of(monkeypatch, parachute="mavlink", range="SUBNET")
+    for node in nodes.values():
+        assert node["additional_env"] == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    assert "SetEnvironmentVariable" not in vehicle.read_text()
 
 
 @pytest.mark.parametrize("parachute", ["upf", "both"])
