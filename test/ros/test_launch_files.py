@@ -29,8 +29,9 @@ EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """Where simulation.launch.py makes the folder of the control sockets."""
+    """Where simulation.launch.py makes the folders of the control sockets and of what is kept."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
     return tmp_path
 
 
@@ -93,9 +94,9 @@ def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
 
 def test_the_simulation_stays_on_this_host():
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    (variable,) = calls(simulation, "SetEnvironmentVariable")
-    assert variable[0] == "'ROS_AUTOMATIC_DISCOVERY_RANGE'"
-    assert variable[1] == "'LOCALHOST'"
+    variables = calls(simulation, "SetEnvironmentVariable")
+    set_to = {variable[0]: variable[1] for variable in variables}
+    assert set_to["'ROS_AUTOMATIC_DISCOVERY_RANGE'"] == "'LOCALHOST'"
     (variable,) = calls(simulation, "UnsetEnvironmentVariable")
     assert variable[0] == "name"
     assert "for name in LEADS_ELSEWHERE" in simulation.read_text()
@@ -372,6 +373,20 @@ def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(
     assert "26:fail-motor" in commands["sim_autopilot"]
     assert "0:wind=5" in commands["sim_autopilot"]
     assert "11:refuse" in commands["sim_mavlink_parachute"]
+
+
+def test_what_a_simulated_vehicle_keeps_is_of_that_run_alone(folder, monkeypatch):
+    """A run before it left the vehicle without its parachute: the next one never took off. And a
+    real vehicle may have the same namespace."""
+    made = made_by(LAUNCH / "simulation.launch.py", monkeypatch, parachute="mavlink")
+    (variable,) = [one for one in made if one.args[:1] == ("ROS_HOME",)]
+    home = Path(variable.args[1])
+    assert home.parent == folder / "chute_ros" / "simulations"
+    assert list(home.iterdir()) == []
+    (group,) = [one for one in made if type(one).__name__ == "GroupAction"]
+    first, *others = group.args[0]
+    assert first is variable
+    assert {type(one).__name__ for one in others} >= {"IncludeLaunchDescription", "Node"}
 
 
 def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys):

@@ -26,6 +26,7 @@ ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
 def _folder(tmp_path, monkeypatch) -> None:
     """Where simulation.launch.py makes the folder of the control sockets."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
 
 
 def start(node: str, *arguments: str) -> tuple[int, list[str]]:
