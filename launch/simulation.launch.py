@@ -19,7 +19,9 @@ from ament_index_python.packages import get_package_share_directory
 from launch.actions import (
     DeclareLaunchArgument,
     ExecuteProcess,
+    GroupAction,
     IncludeLaunchDescription,
+    LogInfo,
     OpaqueFunction,
     SetEnvironmentVariable,
     UnsetEnvironmentVariable,
@@ -39,7 +41,12 @@ from chute_ros.tools.launch_checks import (
     check_port,
     checked,
 )
-from chute_ros.tools.simulated_vehicle import SimulatedVehicle, own_folder, simulators_of
+from chute_ros.tools.simulated_vehicle import (
+    SimulatedVehicle,
+    new_home,
+    own_folder,
+    simulators_of,
+)
 from launch import LaunchContext, LaunchDescription
 
 
@@ -61,7 +68,9 @@ def _vehicle(context: LaunchContext) -> list:
         ),
         checked("simulation.launch.py", lambda: own_folder(folder)),
     )
-    return [
+    home = checked("simulation.launch.py", new_home)
+    started = [
+        SetEnvironmentVariable("ROS_HOME", str(home)),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
             launch_arguments={
@@ -83,6 +92,11 @@ def _vehicle(context: LaunchContext) -> list:
             parameters=[{"vehicle": parachute, "folder": str(folder)}],
             output="screen",
         ),
+    ]
+    # A group: what an including file starts after it has its own ROS_HOME and arguments.
+    return [
+        LogInfo(msg=f"what the nodes keep, such as the black box, is in {home}/chute_ros"),
+        GroupAction(started),
     ]
 
 

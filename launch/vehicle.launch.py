@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -24,6 +24,7 @@ from chute_ros.tools.launch_checks import (
     check_links,
     check_vehicle,
     checked,
+    place_of,
 )
 from launch import LaunchContext, LaunchDescription
 
@@ -38,7 +39,7 @@ def _nodes(context: LaunchContext) -> list:
     parachute = LaunchConfiguration("parachute").perform(context)
     namespace = LaunchConfiguration("namespace").perform(context)
     # An enclave has the name of its node, with the namespace.
-    place = "/".join(["", *filter(None, namespace.split("/"))])
+    place = place_of(context, namespace)
     kinds = [links()[link] for link in vehicles()[parachute].links]
     given = {
         link: LaunchConfiguration(kind.argument.name).perform(context)
@@ -51,6 +52,8 @@ def _nodes(context: LaunchContext) -> list:
     parameters = checked(
         "vehicle.launch.py", lambda: _parameters(parachute, config, place, connections)
     )
+    # Of these nodes alone: an including file may start others, which somebody else must receive.
+    environment = {RANGE: LaunchConfiguration("range").perform(context)}
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
     started = [(kind.package, kind.name) for kind in kinds]
     started.append(("chute_ros", SUPERVISOR))
@@ -64,6 +67,7 @@ def _nodes(context: LaunchContext) -> list:
             namespace=namespace,
             parameters=parameters.get(name, []),
             ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
+            additional_env=environment,
             output="screen",
             **LIVES_ON,
         )
@@ -169,7 +173,6 @@ def generate_launch_description() -> LaunchDescription:
         [
             OpaqueFunction(function=_look),
             *_arguments(),
-            SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
             OpaqueFunction(function=_nodes),
         ]
     )

@@ -13,6 +13,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from chute_ros.errors import ChuteError, ParameterError
+from chute_ros.interrupts import at_ctrl_c
 from chute_ros.plain_text import plain
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
@@ -279,9 +280,12 @@ def _run_link(
 
 
 def main_of(make: Any) -> None:
-    """Run make() and turn a user's mistake into one line and exit code 2."""
+    """Run make() and turn a user's mistake into one line and exit code 2. Until its wires are taken
+    a Ctrl-C ends it at once: as an exception it is lost in a library that passes over it, and the
+    simulator would go on."""
     try:
-        make()
+        with at_ctrl_c(signal.SIG_DFL):
+            make()
     except ChuteError as error:
         print(error, file=sys.stderr)
         sys.exit(2)

@@ -50,6 +50,8 @@ FAILURES = {
 }
 #: Arguments that `ros2 launch` itself adds to those of a launch file, for its options.
 _OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
+#: Where launch_ros keeps the namespace that a launch file has pushed.
+_PUSHED = "ros_namespace"
 #: Two more follow it, and there is none above 65535.
 _LAST_PORT = 65533
 
@@ -70,9 +72,7 @@ def _refuse(text: str) -> NoReturn:
 def given_to(context: Any) -> list[str]:
     """The arguments that a user gave the launch file that now begins (a LaunchContext), by name;
     none where another launch file includes it: what is in the context then is that one's too."""
-    inside = context.get_locals_as_dict()
-    # What is launched is itself included, by the description that the launch began with.
-    began = getattr(inside.get("event"), "launch_description", None)
+    inside, began = context.get_locals_as_dict(), _began_with(context)
     for entity in began.describe_sub_entities() if began else ():
         source = getattr(entity, "launch_description_source", None)
         place = os.path.abspath(source.location) if source else ""
@@ -81,18 +81,34 @@ def given_to(context: Any) -> list[str]:
     return []
 
 
+def _began_with(context: Any) -> Any:
+    """The description that the launch began with, in which what is launched is itself included;
+    None: a later event includes the launch file."""
+    return getattr(context.get_locals_as_dict().get("event"), "launch_description", None)
+
+
 def check_arguments(context: Any, known: Iterable[str]) -> None:
     """context: a LaunchContext before the defaults are set. ParameterError: an argument is given
-    that the launch file does not have; of an including file's only one that is ours misspelt."""
+    that the launch file does not have; of an including file's only one that is ours misspelt and
+    that no launch file declares."""
     known = list(known)
     for name in given_to(context):
         if name not in (*known, *_OF_LAUNCH):
             near = nearest(name.lower(), known, MISSPELT)
             hint = f"did you mean {near}?" if near else f"need one of {', '.join(known)}"
             raise ParameterError(f"there is no launch argument {name}: {hint}")
+    began = _began_with(context)
+    declared = {one.name for one in began.get_launch_arguments()} if began else set()
     for name in context.launch_configurations:
-        if name not in known and (near := nearest(name, known, MISSPELT)):
+        if name not in (*known, *declared) and (near := nearest(name, known, MISSPELT)):
             raise ParameterError(f"there is no launch argument {name}: did you mean {near}?")
+
+
+def place_of(context: Any, namespace: str) -> str:
+    """The whole namespace of the nodes that get this one, as launch_ros makes it: under what an
+    including file has pushed (PushRosNamespace). Empty: the root."""
+    pushed = "" if namespace.startswith("/") else context.launch_configurations.get(_PUSHED, "")
+    return "/".join(["", *filter(None, f"{pushed}/{namespace}".split("/"))])
 
 
 def check_links(context: Any, parachute: str, connections: Mapping[str, str]) -> None:

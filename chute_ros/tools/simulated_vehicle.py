@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -12,6 +13,8 @@ from pathlib import Path
 from chute_ros.errors import NotRegisteredError, ParameterError
 from chute_ros.links.api import Sockets, VehicleKind
 from chute_ros.links.registered import links, vehicles
+from chute_ros.ros.private_files import make_folder
+from chute_ros.ros.ros_home import ros_home
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,19 @@ def simulator_module(executable: str) -> str:
 def control_path(folder: Path | str, simulator: str) -> str:
     """The control socket of a simulator."""
     return f"{folder}/{simulator}.sock"
+
+
+def new_home() -> Path:
+    """ROS_HOME of one run, for what its nodes keep. Of its own: a vehicle of a run before may be
+    without its parachute, and a real one may have the same namespace. ParameterError: it cannot be
+    made."""
+    began = time.strftime("%Y%m%d_%H%M%S")
+    folder = ros_home() / "simulations" / f"{began}_{os.getpid()}"
+    try:
+        make_folder(folder)
+    except OSError as error:
+        raise ParameterError(f"{folder}: {error.strerror or error}: set ROS_HOME") from None
+    return folder
 
 
 def own_folder(path: Path) -> Path:

@@ -19,7 +19,6 @@ import signal
 import socket
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -31,8 +30,7 @@ from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import RANGE
-from chute_ros.ros.private_files import make_folder, open_new
-from chute_ros.ros.ros_home import ros_home
+from chute_ros.ros.private_files import open_new
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.bench_call import call_action
@@ -41,7 +39,12 @@ from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
 from chute_ros.tools.launch_checks import FlightArguments, check_vehicle
 from chute_ros.tools.processes import Processes, ros_arguments
-from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulator_module, simulators_of
+from chute_ros.tools.simulated_vehicle import (
+    SimulatedVehicle,
+    new_home,
+    simulator_module,
+    simulators_of,
+)
 
 #: What a rocket is, as simulation.launch.py names it.
 ROCKET = "umbilical"
@@ -71,7 +74,7 @@ def main() -> None:
             sys.exit(f"sim: {chosen.do}: {error}")
         return
     with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
-        processes = Processes(Path(scratch), _new_home())
+        processes = Processes(Path(scratch), new_home())
         # As a Ctrl-C does, of which the entry knows that it came.
         at_ctrl_c = signal.getsignal(signal.SIGINT)
         signal.signal(signal.SIGTERM, at_ctrl_c if isinstance(at_ctrl_c, CtrlC) else CtrlC())
@@ -160,18 +163,6 @@ def _alone(namespace: str) -> Iterator[None]:
                 "--namespace"
             ) from None
         yield
-
-
-def _new_home() -> Path:
-    """What the nodes of this run keep. Of its own: a vehicle of a run before may be without its
-    parachute."""
-    began = time.strftime("%Y%m%d_%H%M%S")
-    folder = ros_home() / "simulations" / f"{began}_{os.getpid()}"
-    try:
-        make_folder(folder)
-    except OSError as error:
-        _refuse(f"{folder}: {error.strerror or error}: set ROS_HOME")
-    return folder
 
 
 def _refuse(text: str) -> NoReturn:

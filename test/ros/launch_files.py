@@ -44,15 +44,21 @@ def loaded(file, monkeypatch):
 
 class Context:
     """Stands for a LaunchContext as `ros2 launch` makes it: launched has these arguments of the
-    user, and may include file, which now begins."""
+    user, and may include file, which now begins, in the namespace pushed. declared: the arguments
+    of both."""
 
-    def __init__(self, file, arguments, launched=None):
+    def __init__(self, file, arguments, launched=None, pushed=None, declared=()):
         self.launch_configurations = dict(arguments)
+        if pushed is not None:
+            self.launch_configurations["ros_namespace"] = pushed
         include = types.SimpleNamespace(
             launch_description_source=types.SimpleNamespace(location=str(launched or file)),
             launch_arguments=tuple(arguments.items()),
         )
-        began = types.SimpleNamespace(describe_sub_entities=lambda: [include])
+        began = types.SimpleNamespace(
+            describe_sub_entities=lambda: [include],
+            get_launch_arguments=lambda: [types.SimpleNamespace(name=one) for one in declared],
+        )
         self.inside = {
             "event": types.SimpleNamespace(launch_description=began),
             "current_launch_file_path": str(file),
@@ -62,10 +68,12 @@ class Context:
         return self.inside
 
 
-def made_by(file, monkeypatch, launched=None, **arguments):
-    """What a launch file makes of a user's arguments; launched: what includes it."""
+def made_by(file, monkeypatch, launched=None, pushed=None, declares=(), **arguments):
+    """What a launch file makes of a user's arguments; launched: what includes it, declares these
+    of them itself, and has pushed this namespace."""
     space = loaded(file, monkeypatch)
-    context = Context(file, arguments, launched)
+    own = [one.name for one in space["_arguments"]()]
+    context = Context(file, arguments, launched, pushed, [*own, *declares])
     Recorded.made.clear()
     space["_look"](context)
     Recorded.made.clear()

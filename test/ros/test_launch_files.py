@@ -29,8 +29,9 @@ EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """Where simulation.launch.py makes the folder of the control sockets."""
+    """Where simulation.launch.py makes the folders of the control sockets and of what is kept."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
     return tmp_path
 
 
@@ -93,9 +94,9 @@ def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
 
 def test_the_simulation_stays_on_this_host():
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    (variable,) = calls(simulation, "SetEnvironmentVariable")
-    assert variable[0] == "'ROS_AUTOMATIC_DISCOVERY_RANGE'"
-    assert variable[1] == "'LOCALHOST'"
+    variables = calls(simulation, "SetEnvironmentVariable")
+    set_to = {variable[0]: variable[1] for variable in variables}
+    assert set_to["'ROS_AUTOMATIC_DISCOVERY_RANGE'"] == "'LOCALHOST'"
     (variable,) = calls(simulation, "UnsetEnvironmentVariable")
     assert variable[0] == "name"
     assert "for name in LEADS_ELSEWHERE" in simulation.read_text()
@@ -333,9 +334,15 @@ def test_a_vehicle_is_heard_on_its_own_computer_unless_it_is_said_otherwise(
     space["generate_launch_description"]()
     (argument,) = [one for one in Recorded.made if one.args[:1] == ("range",) and one.options]
     assert argument.options["default_value"] == who
-    (variable,) = [one for one in Recorded.made if type(one).__name__ == "SetEnvironmentVariable"]
-    assert variable.args[0] == "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    assert variable.args[1].args == ("range",)
+
+
+def test_the_range_is_of_the_vehicles_nodes_alone(monkeypatch):
+    """Not of what an including launch file starts after them."""
+    nodes = nodes_of(monkeypatch, parachute="mavlink", range="SUBNET")
+    for node in nodes.values():
+        assert node["additional_env"] == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    assert "SetEnvironmentVariable" not in vehicle.read_text()
 
 
 @pytest.mark.parametrize("parachute", ["upf", "both"])
@@ -368,6 +375,20 @@ def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(
     assert "11:refuse" in commands["sim_mavlink_parachute"]
 
 
+def test_what_a_simulated_vehicle_keeps_is_of_that_run_alone(folder, monkeypatch):
+    """A run before it left the vehicle without its parachute: the next one never took off. And a
+    real vehicle may have the same namespace."""
+    made = made_by(LAUNCH / "simulation.launch.py", monkeypatch, parachute="mavlink")
+    (variable,) = [one for one in made if one.args[:1] == ("ROS_HOME",)]
+    home = Path(variable.args[1])
+    assert home.parent == folder / "chute_ros" / "simulations"
+    assert list(home.iterdir()) == []
+    (group,) = [one for one in made if type(one).__name__ == "GroupAction"]
+    first, *others = group.args[0]
+    assert first is variable
+    assert {type(one).__name__ for one in others} >= {"IncludeLaunchDescription", "Node"}
+
+
 def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys):
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     with pytest.raises(SystemExit) as ended:
@@ -379,11 +400,19 @@ def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys
 
 
 @pytest.mark.parametrize(
-    ("namespace", "place"), [("", ""), ("drone1", "/drone1"), ("/fleet/drone1", "/fleet/drone1")]
+    ("pushed", "namespace", "place"),
+    [
+        (None, "", ""),
+        (None, "drone1", "/drone1"),
+        (None, "/fleet/drone1", "/fleet/drone1"),
+        ("/fleet", "drone1", "/fleet/drone1"),
+    ],
 )
-def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(namespace, place, monkeypatch):
+def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(
+    pushed, namespace, place, monkeypatch
+):
     (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
-    given = {"parachute": "both", "namespace": namespace}
+    given = {"parachute": "both", "namespace": namespace, "pushed": pushed}
     for enclaves in ("true", "false"):
         made = made_by(vehicle, monkeypatch, **given, enclaves=enclaves)
         nodes = [one.options for one in made if "executable" in one.options]

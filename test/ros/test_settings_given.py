@@ -26,6 +26,7 @@ ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
 def _folder(tmp_path, monkeypatch) -> None:
     """Where simulation.launch.py makes the folder of the control sockets."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
 
 
 def start(node: str, *arguments: str) -> tuple[int, list[str]]:
@@ -310,6 +311,39 @@ def test_a_launch_argument_that_is_misspelt_is_told(
     assert refused(monkeypatch, capsys, file, **{name: "given"}) == told
     assert refused(monkeypatch, capsys, file, **{name: "given"}, **foreign) == told
     assert nodes_of(made_by(LAUNCH / file, monkeypatch, **foreign))
+
+
+@pytest.mark.parametrize("file", [VEHICLE, SIMULATION])
+@pytest.mark.parametrize("name", ["configs", "namespaces", "connections", "ports"])
+def test_an_argument_that_an_including_file_declares_is_its_own_however_like_one_of_ours(
+    file: str, name: str, monkeypatch
+) -> None:
+    theirs = {"launched": "/fleet.launch.py", "declares": [name], name: "their own"}
+    assert nodes_of(made_by(LAUNCH / file, monkeypatch, **theirs, parachute="mavlink"))
+
+
+@pytest.mark.parametrize(
+    ("pushed", "namespace", "place"),
+    [
+        ("/fleet", "drone1", "/fleet/drone1"),
+        ("/drone1", "", "/drone1"),
+        ("/", "drone1", "/drone1"),
+        ("/fleet", "/drone1", "/drone1"),
+    ],
+)
+def test_a_file_for_a_whole_name_is_for_the_node_in_the_namespace_that_was_pushed(
+    pushed: str, namespace: str, place: str, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    """As PushRosNamespace does it, in an including launch file."""
+    given = {"parachute": "mavlink", "namespace": namespace, "pushed": pushed}
+    path = tmp_path / "settings.yaml"
+    given |= {"launched": "/fleet.launch.py", "config": str(path)}
+    theirs = GOOD.format("connection: udpin:0.0.0.0:1")
+    path.write_text(theirs.replace("/**", place))
+    assert len(nodes_of(made_by(LAUNCH / VEHICLE, monkeypatch, **given))) == 2
+    path.write_text(theirs.replace("/**", "/elsewhere"))
+    line = refused(monkeypatch, capsys, VEHICLE, **given)
+    assert f"has no ros__parameters for {place}/mavlink_parachute" in line
 
 
 @pytest.mark.parametrize("file", [VEHICLE, SIMULATION])

@@ -20,6 +20,7 @@ from chute_ros.transport.signing_key import signing_from_file
 PARACHUTE = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
 AUTOPILOT = "chute_ros.sim.sim_autopilot"
 BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
+DIALECT = "chute_ros.protocol.mavlink.dialect"
 LOCAL = "127.0.0.1"
 MSG_DEFS = Path(__file__).parents[2] / "msg_defs"
 #: Makes `import rclpy` fail as on a machine without ROS.
@@ -263,6 +264,52 @@ def test_it_ends_however_early_the_signal_comes(start, tmp_path):
         running = start(AUTOPILOT, "--quiet", "--connection", where)
         assert station.recv(300)
     assert running.end() == 0
+
+
+#: Interrupts itself as it imports a module that it needs, and passes over the exception, as
+#: pymavlink does around numpy.
+IMPORTING = """
+import contextlib
+import os
+import signal
+import sys
+
+
+class Interrupted:
+    def find_spec(self, name, path=None, target=None):
+        if name == "MODULE":
+            sys.meta_path.remove(self)
+            with contextlib.suppress(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
+
+
+sys.meta_path.insert(0, Interrupted())
+"""
+
+
+@pytest.mark.parametrize(
+    ("simulator", "module"),
+    [
+        (PARACHUTE, DIALECT),
+        (AUTOPILOT, DIALECT),
+        ("chute_ros.links.upf.simulator.sim_upf", "numpy"),
+    ],
+)
+def test_a_library_that_passes_over_ctrl_c_does_not_keep_it_running(
+    simulator, module, environment, tmp_path
+):
+    """It ran on after the Ctrl-C of a launch, until launch sent SIGTERM 5 s later."""
+    with (tmp_path / "sitecustomize.py").open("a") as file:
+        file.write(IMPORTING.replace("MODULE", module))
+    done = subprocess.run(
+        [sys.executable, "-m", simulator, "--at", "5:what it refuses, and ends"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=20.0,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
 @BOTH

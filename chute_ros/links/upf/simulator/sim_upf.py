@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.sim.command_line import (
     main_of,
     number,
@@ -18,6 +17,9 @@ from chute_ros.transport.address import FORMS
 
 
 def _run() -> None:
+    # Here, as all that needs the library of DroneCAN: main_of has a Ctrl-C end these imports.
+    from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
+
     options = parser(
         "sim_upf",
         "A UPF parachute: controller and trigger, with all services, parameters and automatic "
