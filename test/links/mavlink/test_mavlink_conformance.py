@@ -20,7 +20,7 @@ from chute_ros.links.mavlink.simulator.broken import BREAKS
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import DeploymentTrigger, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.frames import FrameDecoder
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 
 NAMES = [one.name for one in CLAUSES]
@@ -106,6 +106,50 @@ def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
     lacks += ["interval-default", "interval-stop", "automatic-release", "release"]
     assert run.of(Verdict.NOT_SUPPORTED) == lacks
     assert run.of(Verdict.FAILED) == []
+
+
+class SlowParachute(ParachuteDevice):
+    """Answers each command with IN_PROGRESS, and carries it out so much later (s). at_once: the
+    result comes together with that first answer."""
+
+    takes = 0.3
+
+    def __init__(self, settings: ParachuteSettings) -> None:
+        super().__init__(settings, [])
+        self._waiting: list[tuple[float, Frame]] = []
+
+    def _command(self, frame: Frame) -> None:
+        self.acknowledge(frame, int(dialect.MAV_RESULT_IN_PROGRESS))
+        self._waiting.append((self.now + self.takes, frame))
+        self.step(self.now)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        due = [frame for at, frame in self._waiting if at <= now]
+        self._waiting = [(at, frame) for at, frame in self._waiting if at > now]
+        for frame in due:
+            super()._command(frame)
+
+    def next_step(self) -> float:
+        return min((at for at, _ in self._waiting), default=math.inf)
+
+
+@pytest.mark.parametrize("takes", [0.0, 0.3, 2.5])
+def test_a_device_that_is_in_progress_first_is_judged_by_its_result(takes: float) -> None:
+    device = SlowParachute(ParachuteSettings())
+    device.takes = takes
+    run = Run(device).to()
+    assert run.of(Verdict.FAILED) == []
+    assert {"release", "released-stays", "arm-sources"} <= {*run.of(Verdict.PASSED)}
+
+
+def test_a_device_that_stays_in_progress_has_no_result() -> None:
+    device = sound()
+    device.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda _: int(dialect.MAV_RESULT_IN_PROGRESS)
+    run = Run(device).to()
+    assert run.results["release"].verdict is Verdict.FAILED
+    assert run.results["release"].why.endswith("IN_PROGRESS, and no result within 5 s")
+    assert "release-disarmed" in run.of(Verdict.FAILED)
 
 
 # -- whatever it is told -------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import ReceivedPacket, RecordingBench
+from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
@@ -22,6 +22,8 @@ _FOUND_WITHIN = 10.0
 #: An answer comes within this, s; a command is sent so often before it counts as not answered.
 ANSWER = 1.0
 TRIES = 3
+#: The result follows an answer IN_PROGRESS within this, s.
+RESULT_WITHIN = 5.0
 #: A status comes by its stream at the latest, s.
 STATUS_WITHIN = 3.0
 #: A status is streamed at nominally 1 Hz, us.
@@ -270,12 +272,21 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         return None
 
     def answer(self, command: int, within: float = ANSWER) -> Any:
-        """The next answer to this command; None: none came."""
-        return (
-            yield from self.wait_for(
-                "COMMAND_ACK", within, lambda one: one.message.command == command
-            )
-        )
+        """The next result of this command, or IN_PROGRESS where none follows it; None: no answer
+        came."""
+
+        def answers(one: ReceivedFrame) -> bool:
+            return one.kind == "COMMAND_ACK" and one.message.command == command
+
+        since = len(self.heard)
+        first = first_of(self.heard, since, answers)
+        yield Wait(self.now + within, first)
+        if (begun := first()) is None or not in_progress(begun):
+            return begun
+        # The result may have come together with it.
+        result = first_of(self.heard, since, lambda one: answers(one) and not in_progress(one))
+        yield Wait(self.now + RESULT_WITHIN, result)
+        return result() or begun
 
     def accepted(self, command: int, *params: float) -> Any:
         """The same; it must be accepted."""
@@ -311,9 +322,15 @@ def entry_name(enumeration: str, number: int) -> str:
     return known.name if known else f"{enumeration} {number}"
 
 
+def in_progress(answer: ReceivedFrame) -> bool:
+    """The result is still to come."""
+    return bool(answer.message.result == dialect.MAV_RESULT_IN_PROGRESS)
+
+
 def result_of(answer: ReceivedFrame) -> str:
     """The result of an answer by its name."""
-    return entry_name("MAV_RESULT", answer.message.result)
+    name = entry_name("MAV_RESULT", answer.message.result)
+    return f"{name}, and no result within {RESULT_WITHIN:g} s" if in_progress(answer) else name
 
 
 def refused(answer: ReceivedFrame | None, what: str, besides: str = "") -> str:
@@ -322,4 +339,6 @@ def refused(answer: ReceivedFrame | None, what: str, besides: str = "") -> str:
         raise failed(f"{what} is not answered")
     if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
         raise failed(f"{what} is ACCEPTED{besides}")
+    if in_progress(answer):
+        raise failed(f"{what} is answered with {result_of(answer)}")
     return f"answered with {result_of(answer)}"

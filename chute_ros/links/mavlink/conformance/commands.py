@@ -6,7 +6,13 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from chute_ros.conformance.clause import READS, SOAK, Trial, Wait, failed, not_supported, not_tried
-from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.bench import (
+    RESULT_WITHIN,
+    US,
+    MavlinkBench,
+    in_progress,
+    result_of,
+)
 from chute_ros.links.mavlink.conformance.connection import WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import (
     COMMAND,
@@ -142,7 +148,7 @@ def _reordered(bench: MavlinkBench) -> Trial:
 
     bench.send(bench.command_long(_REQUEST, _STATUS), change=hold)
     bench.send(bench.command_long(_UNKNOWN), change=lambda frame: (frame, *held))
-    until = bench.now + 1.0
+    until = bench.now + RESULT_WITHIN
     since, both = len(bench.heard), {_REQUEST, _UNKNOWN}
     yield Wait(until, lambda: both <= _answered(bench, since))
     if left := both - _answered(bench, since):
@@ -151,8 +157,9 @@ def _reordered(bench: MavlinkBench) -> Trial:
 
 
 def _answered(bench: MavlinkBench, since: int) -> set[int]:
+    """The commands whose results came."""
     answers = (one for one in bench.heard[since:] if one.kind == "COMMAND_ACK")
-    return {one.message.command for one in answers}
+    return {one.message.command for one in answers if not in_progress(one)}
 
 
 def _noise(bench: MavlinkBench) -> Trial:
