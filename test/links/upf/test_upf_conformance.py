@@ -3,6 +3,7 @@ time."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import cycle
@@ -224,6 +225,48 @@ def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start()
     line = VirtualLine(Session(run.bench, [restart], Allowed()), run.bus)
     line.run()
     assert of(line, Verdict.FAILED) == ["restart"]
+
+
+class LateRestart(UpfController):
+    """Answers RestartNode, and starts anew a moment later, so that its answer can leave it.
+    intervals: those of its messages hold from the next start on."""
+
+    intervals = False
+    _restarts_at = math.inf
+
+    def reboot(self) -> None:
+        if math.isnan(self.booted_at) or self.now >= self._restarts_at:
+            self._restarts_at = math.inf
+            super().reboot()
+            self._at_start = dict(self.values)
+        else:
+            self._restarts_at = self.now + 0.3
+
+    def _interval(self, name: str) -> float:
+        values = self._at_start if self.intervals else self.values
+        return float(values[name]) / 1000.0
+
+    def step(self, now: float) -> None:
+        if now >= self._restarts_at:
+            self.reboot()
+        super().step(now)
+
+
+@pytest.mark.parametrize("intervals", [False, True])
+def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
+    run = Run(Risk.NONE)
+    device = LateRestart(DEFINITIONS)
+    device.intervals = intervals
+    line = VirtualLine(run.session, UpfBus([device, run.trigger]))
+    line.run()
+    assert of(line, Verdict.FAILED) == []
+    found = results(line)
+    assert found["auto-save"].verdict is Verdict.PASSED
+    for name in ("node-interval", "parachute-interval"):
+        assert found[name].verdict is Verdict.PASSED
+        assert found[name].why.endswith("after a restart") is intervals
+    assert device.values == device.saved == CONTROLLER_PARAMETERS
+    assert problem(line) == ""
 
 
 # -- what it must not do -------------------------------------------------------------------------

@@ -387,10 +387,14 @@ class UpfBench(RecordingBench[TransferPacket]):
             del self.changed[name]
         return True
 
+    def save(self) -> Any:
+        """The answer (its values) as its parameters are to be kept; None: not answered."""
+        values = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
+        return (yield from self.call(bus_requests.EXECUTE_OPCODE, values))
+
     def save_and_restart(self) -> Trial:
         """What was set is kept, whether it saves by itself or not."""
-        save = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
-        yield from self.call(bus_requests.EXECUTE_OPCODE, save)
+        yield from self.save()
         yield from self.call(
             bus_requests.RESTART_NODE, {"magic_number": bus_requests.RESTART_MAGIC}, 1
         )
