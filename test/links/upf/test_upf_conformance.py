@@ -37,7 +37,7 @@ from chute_ros.links.upf.simulator.broken import BREAKS
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
@@ -227,29 +227,44 @@ def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start()
     assert of(line, Verdict.FAILED) == ["restart"]
 
 
-class LateRestart(UpfController):
-    """Answers RestartNode, and starts anew a moment later, so that its answer can leave it.
-    intervals: those of its messages hold from the next start on."""
+class StartsLate(UpfNode):
+    """Answers RestartNode, and starts anew a moment later, so that its answer can leave it."""
 
-    intervals = False
     _restarts_at = math.inf
 
     def reboot(self) -> None:
         if math.isnan(self.booted_at) or self.now >= self._restarts_at:
             self._restarts_at = math.inf
             super().reboot()
-            self._at_start = dict(self.values)
         else:
             self._restarts_at = self.now + 0.3
-
-    def _interval(self, name: str) -> float:
-        values = self._at_start if self.intervals else self.values
-        return float(values[name]) / 1000.0
 
     def step(self, now: float) -> None:
         if now >= self._restarts_at:
             self.reboot()
         super().step(now)
+
+    def next_step(self) -> float:
+        return min(super().next_step(), self._restarts_at)
+
+
+class LateTrigger(StartsLate, UpfTrigger):
+    """A trigger."""
+
+
+class LateRestart(StartsLate, UpfController):
+    """A controller. intervals: those of its messages hold from the next start on."""
+
+    intervals = False
+
+    def reboot(self) -> None:
+        super().reboot()
+        if self.booted_at == self.now:
+            self._at_start = dict(self.values)
+
+    def _interval(self, name: str) -> float:
+        values = self._at_start if self.intervals else self.values
+        return float(values[name]) / 1000.0
 
 
 @pytest.mark.parametrize("intervals", [False, True])
@@ -266,6 +281,24 @@ def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
         assert found[name].verdict is Verdict.PASSED
         assert found[name].why.endswith("after a restart") is intervals
     assert device.values == device.saved == CONTROLLER_PARAMETERS
+    assert problem(line) == ""
+
+
+@pytest.mark.parametrize("options", [(DNA,), (TRIGGER, DNA)])
+def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
+    options: tuple[str, ...],
+) -> None:
+    """Given a device that has no node id a moment after it has answered RestartNode."""
+    run = Run(Risk.FIRES, *options)
+    late = LateTrigger(DEFINITIONS) if TRIGGER in options else LateRestart(DEFINITIONS)
+    kind = A_TRIGGER if TRIGGER in options else A_CONTROLLER
+    bench = UpfBench(DEFINITIONS, Risk.FIRES, dna=True, device=kind)
+    peer = run.controller if TRIGGER in options else run.trigger
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, options)), UpfBus([late, peer]))
+    line.run()
+    assert of(line, Verdict.FAILED) == []
+    passed = {"trigger-dna", "trigger-dna-forgets"} if TRIGGER in options else {"dna"}
+    assert passed <= {*of(line, Verdict.PASSED)}
     assert problem(line) == ""
 
 

@@ -30,6 +30,10 @@ _FOUND_WITHIN = 10.0
 #: An answer comes within this, s; a call is made so often before it counts as not answered.
 ANSWER = 0.5
 TRIES = 3
+#: DroneCAN: a node tells its status at least so often, s.
+LONGEST_STATUS = 1.0
+#: It starts anew so long after it was told to at the latest, s.
+_STARTS_WITHIN = 5.0
 #: A state is broadcast at the latest after this, s.
 STATUS_WITHIN = 3.0
 #: The option of clauses that take the device's node id from it, and how long it may be away, s.
@@ -392,13 +396,38 @@ class UpfBench(RecordingBench[TransferPacket]):
         values = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
         return (yield from self.call(bus_requests.EXECUTE_OPCODE, values))
 
-    def save_and_restart(self) -> Trial:
-        """What was set is kept, whether it saves by itself or not."""
-        yield from self.save()
-        yield from self.call(
-            bus_requests.RESTART_NODE, {"magic_number": bus_requests.RESTART_MAGIC}, 1
+    def restart(self) -> Any:
+        """Whether RestartNode is not refused; then it begins to start anew, if it does."""
+        node, starts, since = self.node, self.starts, len(self.every)
+        magic = {"magic_number": bus_requests.RESTART_MAGIC}
+        # It may be gone before it has answered.
+        answer = yield from self.call(bus_requests.RESTART_NODE, magic, 1)
+        if answer is not None and not answer["ok"]:
+            return False
+
+        def begins(one: TransferPacket) -> bool:
+            source = one.transfer.source
+            if one.kind == ALLOCATION:
+                return not source
+            if one.kind != self.device.status or source not in self._ids:
+                return False
+            return source != node or self.state_in(one) is ParachuteState.NOT_READY
+
+        # It may begin a moment after it has answered, and tell its old state until then.
+        begun = first_of(self.every, since, begins)
+        yield Wait(self.now + _STARTS_WITHIN, lambda: self.starts > starts or begun())
+        return True
+
+    def is_back(self, within: float) -> Any:
+        """Whether its start has ended within so many s. Its NodeStatus shows the start then."""
+        shows = first_of(
+            self.every,
+            len(self.every),
+            lambda one: one.kind == NODE_STATUS and one.transfer.source == self.node,
         )
-        return ""
+        is_up = yield from self.is_up(within)
+        yield Wait(self.now + LONGEST_STATUS, shows)
+        return is_up
 
     def comes_back(self, within: float) -> Any:
         """Whether it tells its state within so many s, under its new node id."""
@@ -415,9 +444,10 @@ class UpfBench(RecordingBench[TransferPacket]):
         """Whether it is under its own node id again, with the static node id that it had."""
         if not (yield from self.put_back(p.STATIC_NODE_ID)):
             return False
-        yield from self.save_and_restart()
+        yield from self.save()
+        yield from self.restart()
         self.node = self._home
-        return (yield from self.is_up(_AWAY))
+        return (yield from self.is_back(_AWAY))
 
     def state_in(self, status: TransferPacket) -> ParachuteState | None:
         """The state in its status; None: a number without a name, or the types do not tell it."""

@@ -7,7 +7,6 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import (
     READS,
     SOAK,
@@ -19,7 +18,12 @@ from chute_ros.conformance.clause import (
     not_supported,
     not_tried,
 )
-from chute_ros.links.upf.conformance.bench import NODE_STATUS, TransferPacket, UpfBench
+from chute_ros.links.upf.conformance.bench import (
+    LONGEST_STATUS,
+    NODE_STATUS,
+    TransferPacket,
+    UpfBench,
+)
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -31,15 +35,12 @@ DOCUMENT = "Flyfire UPF UAVCAN protocol V1.0"
 WATCHED = 5.0
 _SETS, _RESTARTS = "a parameter is changed, and set back", "it restarts"
 _SETS_AND_RESTARTS = f"{_SETS}; it may be restarted for that"
-#: DroneCAN: a node tells its status at least so often, s.
-_LONGEST_STATUS = 1.0
 #: An interval may be off by this share, and this much, s.
 _SHARE, _LEAST = 0.25, 0.02
 #: Set for a trial, ms.
 _NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
 _UNKNOWN = "No Such Parameter"
-#: It restarts so long after it was told to at the latest, and is ready so long after that, s.
-_STARTS_WITHIN = 5.0
+#: It is ready so long after a restart at the latest, s.
 READY_WITHIN = 15.0
 #: Microseconds since 1970.
 _SOME_TIME = 1_790_000_000_000_000
@@ -76,7 +77,7 @@ def _begins_anew(statuses: Iterable[TransferPacket]) -> bool:
 def _node_status(bench: UpfBench) -> Trial:
     yield from bench.watch(WATCHED)
     longest = _longest_pause(bench, WATCHED)
-    if longest > _LONGEST_STATUS * (1.0 + _SHARE):
+    if longest > LONGEST_STATUS * (1.0 + _SHARE):
         raise failed(
             f"NodeStatus pauses for {longest:.2f} s (need at most 1)", bench.packets(NODE_STATUS)
         )
@@ -87,7 +88,7 @@ def _node_mode(bench: UpfBench) -> Trial:
     if not (told := (yield from bench.watch_once(WATCHED, NODE_STATUS))):
         raise not_tried("no NodeStatus came")
     # It may tell its state before the NodeStatus that goes with it.
-    since = told[-1].at - _LONGEST_STATUS * (1.0 + _SHARE)
+    since = told[-1].at - LONGEST_STATUS * (1.0 + _SHARE)
     states = (one for one in bench.heard if one.kind == bench.device.status and one.at >= since)
     if any(bench.state_in(one) is ParachuteState.NOT_READY for one in states):
         raise not_tried("it was NOT_READY a moment before")
@@ -298,27 +299,17 @@ def _restart_refused(bench: UpfBench) -> Trial:
     return "it goes on"
 
 
-def _restarts(bench: UpfBench) -> Any:
-    """It is told to. False: it says no; it may be gone before it has answered."""
-    magic = {"magic_number": bus_requests.RESTART_MAGIC}
-    answer = yield from bench.call(bus_requests.RESTART_NODE, magic, 1)
-    return answer is None or bool(answer["ok"])
-
-
 def _restart(bench: UpfBench) -> Trial:
     """What it does then is watched."""
     # Of one that has only started a second start could not be told from the first.
     yield from bench.wait_for(NODE_STATUS, WATCHED, lambda one: one.values["uptime_sec"] > 1)
-    starts = bench.starts
-    obeys = yield from _restarts(bench)
-    since = len(bench.heard)
-    if not obeys:
+    starts, since = bench.starts, len(bench.heard)
+    if not (yield from bench.restart()):
         raise failed("RestartNode is not ok")
-    yield from bench.reaches(ParachuteState.NOT_READY, _STARTS_WITHIN)
     is_up = yield from bench.is_up(READY_WITHIN)
     up = bench.device.up or "received"
     yield from bench.watch_on(0.5)
-    yield Wait(bench.now + _LONGEST_STATUS, lambda: bench.starts > starts)
+    yield Wait(bench.now + LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
     if not is_up:
         raise failed(f"it is not {up} within {READY_WITHIN:g} s")
@@ -379,18 +370,10 @@ def _kept_by_opcode(bench: UpfBench) -> Trial:
 
 
 def _restarted(bench: UpfBench) -> Any:
-    """Whether it is told to, and says no other; then it has started anew, and is up."""
-    starts, since = bench.starts, len(bench.heard)
-    if not (yield from _restarts(bench)):
+    """Whether it is told to, and does not refuse; then it is up again."""
+    if not (yield from bench.restart()):
         return False
-
-    def is_starting(one: TransferPacket) -> bool:
-        return one.kind == bench.device.status and bench.state_in(one) is ParachuteState.NOT_READY
-
-    # It may restart a moment after it has answered, and tell its old state until then.
-    begun = first_of(bench.heard, since, is_starting)
-    yield Wait(bench.now + _STARTS_WITHIN, lambda: bench.starts > starts or begun())
-    yield from bench.is_up(READY_WITHIN)
+    yield from bench.is_back(READY_WITHIN)
     return True
 
 
@@ -416,7 +399,7 @@ def _time_sync(bench: UpfBench) -> Trial:
 def _soak(bench: UpfBench) -> Trial:
     yield from bench.watch(bench.soak)
     longest = _longest_pause(bench, bench.soak)
-    if longest > _LONGEST_STATUS * (1.0 + _SHARE):
+    if longest > LONGEST_STATUS * (1.0 + _SHARE):
         raise failed(f"NodeStatus paused for {longest:.1f} s", bench.packets(NODE_STATUS)[-5:])
     if _begins_anew(_node_statuses(bench)):
         raise failed("it restarted meanwhile", bench.packets(NODE_STATUS)[-5:])
