@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import cycle
 
 import pytest
@@ -22,6 +23,7 @@ from chute_ros.model import DeploymentTrigger, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
+from chute_ros.sim.mavlink_device import Params
 
 NAMES = [one.name for one in CLAUSES]
 OF_SIGNING = ["unsigned-refused", "wrong-key-refused", "replay-refused", "signed-answers"]
@@ -103,7 +105,8 @@ def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
     del device.default_intervals[dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC]
     run = Run(device).to()
     lacks = ["request-information", "information-texts", "set-interval", "interval-told"]
-    lacks += ["interval-default", "interval-stop", "automatic-release", "release"]
+    lacks += ["interval-default", "interval-stop", "heartbeat-constant"]
+    lacks += ["automatic-release", "release"]
     assert run.of(Verdict.NOT_SUPPORTED) == lacks
     assert run.of(Verdict.FAILED) == []
 
@@ -150,6 +153,79 @@ def test_a_device_that_stays_in_progress_has_no_result() -> None:
     assert run.results["release"].verdict is Verdict.FAILED
     assert run.results["release"].why.endswith("IN_PROGRESS, and no result within 5 s")
     assert "release-disarmed" in run.of(Verdict.FAILED)
+
+
+# -- what shows only at a second look -------------------------------------------------------------
+
+
+class SlyParachute(ParachuteDevice):
+    """Wrong in a way that no first answer and no first status shows. does: in which."""
+
+    def __init__(self, does: str) -> None:
+        super().__init__(ParachuteSettings(), [])
+        self.does, self._at = does, math.inf
+        right = self.commands[dialect.MAV_CMD_DO_PARACHUTE]
+        self.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda params: self._do(params, right)
+
+    def _do(self, params: Params, right: Callable[[Params], int]) -> int:
+        result = right(params)
+        late = ("releases after its refusal", "takes its release back", "names another trigger")
+        if params[0] == dialect.PARACHUTE_RELEASE and self.does in late:
+            if (result == dialect.MAV_RESULT_ACCEPTED) is (self.does != late[0]):
+                self._at = self.now + 1.0
+        if params[0] == dialect.PARACHUTE_ENABLE and self.does == "arms all by action 1":
+            self.armed = TriggerFlags(255)
+        if params[0] == dialect.PARACHUTE_DISABLE and self.does == "disarms all by action 0":
+            self.armed = TriggerFlags(0)
+        return result
+
+    def carry_out(self, command: object) -> int:
+        if command.get_type() != "COMMAND_INT":  # type: ignore[attr-defined]
+            return super().carry_out(command)
+        params = (command.param1, command.param2, *[0.0] * 5)  # type: ignore[attr-defined]
+        number = command.command  # type: ignore[attr-defined]
+        if number == dialect.MAV_CMD_SET_PARACHUTE_ARM and self.does == "arms without the mask":
+            self.armed = TriggerFlags(int(params[0]))
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        if number == dialect.MAV_CMD_DO_PARACHUTE and self.does == "releases by COMMAND_INT":
+            self.deploy(DeploymentTrigger.MAVLINK)
+            return int(dialect.MAV_RESULT_FAILED)
+        return self.commands[number](params)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        if now >= self._at:
+            self._at = math.inf
+            self.deployment = {
+                "takes its release back": DeploymentTrigger.NONE,
+                "names another trigger": DeploymentTrigger.ATS,
+            }.get(self.does, DeploymentTrigger.MAVLINK)
+        if self.deployment is not DeploymentTrigger.NONE and self.does == "reports no more":
+            self._due.pop(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS, None)
+
+    def next_step(self) -> float:
+        return self._at
+
+
+@pytest.mark.parametrize(
+    ("does", "clause"),
+    [
+        ("releases after its refusal", "release-disarmed"),
+        ("releases by COMMAND_INT", "release-disarmed"),
+        ("arms without the mask", "arm-mask"),
+        ("arms all by action 1", "automatic-release"),
+        ("disarms all by action 0", "automatic-release"),
+        ("takes its release back", "released-stays"),
+        ("names another trigger", "released-stays"),
+        ("reports no more", "released-stays"),
+    ],
+)
+def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
+    assert Run(SlyParachute(does)).to().of(Verdict.FAILED) == [clause]
+
+
+def test_a_device_that_obeys_command_int_as_well_passes() -> None:
+    assert Run(SlyParachute("")).to().of(Verdict.FAILED) == []
 
 
 # -- whatever it is told -------------------------------------------------------------------------

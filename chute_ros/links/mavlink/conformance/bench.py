@@ -24,6 +24,8 @@ ANSWER = 1.0
 TRIES = 3
 #: The result follows an answer IN_PROGRESS within this, s.
 RESULT_WITHIN = 5.0
+#: An answer that comes twice does so within this, s: it is none to the next command.
+_AGAIN = 0.05
 #: A status comes by its stream at the latest, s.
 STATUS_WITHIN = 3.0
 #: A status is streamed at nominally 1 Hz, us.
@@ -75,6 +77,8 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         self._beat_at = -math.inf
         #: It was told to send its status otherwise than it does by itself.
         self._other_interval = False
+        #: From which of heard on it was told to release; negative: it was not, or did not.
+        self.released_from = -1
 
     # -- as the session wants it ------------------------------------------------------------------
 
@@ -150,6 +154,13 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         padded = (*params, *[0.0] * (7 - len(params)))
         return dialect.MAVLink_command_long_message(
             system, component, command, confirmation, *padded
+        )
+
+    def command_int(self, command: int, *params: float) -> Any:
+        """COMMAND_INT to the device."""
+        padded = (*params, *[0.0] * (4 - len(params)))
+        return dialect.MAVLink_command_int_message(
+            self.system, self.component, 0, command, 0, 0, *padded, 0, 0, 0.0
         )
 
     def _packed(
@@ -238,9 +249,11 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
     def status_every(self, interval: int) -> Any:
         """The answer (ReceivedFrame) as PARACHUTE_STATUS is to come each so many us (-1: never,
         0: as delivered); None: none came."""
+        # Until its answer has been looked at, it may have done so.
+        before, self._other_interval = self._other_interval, True
         answer = yield from self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _STATUS, interval)
-        if answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED:
-            self._other_interval = interval != 0
+        taken = answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED
+        self._other_interval = interval != 0 if taken else before
         return answer
 
     def status_as_before(self) -> Trial:
@@ -281,12 +294,15 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         since = len(self.heard)
         first = first_of(self.heard, since, answers)
         yield Wait(self.now + within, first)
-        if (begun := first()) is None or not in_progress(begun):
-            return begun
-        # The result may have come together with it.
-        result = first_of(self.heard, since, lambda one: answers(one) and not in_progress(one))
-        yield Wait(self.now + RESULT_WITHIN, result)
-        return result() or begun
+        if (answer := first()) is None:
+            return None
+        if in_progress(answer):
+            # The result may have come together with it.
+            result = first_of(self.heard, since, lambda one: answers(one) and not in_progress(one))
+            yield Wait(self.now + RESULT_WITHIN, result)
+            answer = result() or answer
+        yield from self.watch_on(_AGAIN)
+        return answer
 
     def accepted(self, command: int, *params: float) -> Any:
         """The same; it must be accepted."""
