@@ -169,10 +169,13 @@ class SlyParachute(ParachuteDevice):
 
     def _do(self, params: Params, right: Callable[[Params], int]) -> int:
         result = right(params)
-        late = ("releases after its refusal", "takes its release back", "names another trigger")
-        if params[0] == dialect.PARACHUTE_RELEASE and self.does in late:
-            if (result == dialect.MAV_RESULT_ACCEPTED) is (self.does != late[0]):
-                self._at = self.now + 1.0
+        late = {
+            "releases after its refusal": dialect.MAV_RESULT_FAILED,
+            "takes its release back": dialect.MAV_RESULT_ACCEPTED,
+            "names another trigger": dialect.MAV_RESULT_ACCEPTED,
+        }
+        if params[0] == dialect.PARACHUTE_RELEASE and result == late.get(self.does):
+            self._at = self.now + 1.0
         if params[0] == dialect.PARACHUTE_ENABLE and self.does == "arms all by action 1":
             self.armed = TriggerFlags(255)
         if params[0] == dialect.PARACHUTE_DISABLE and self.does == "disarms all by action 0":

@@ -104,6 +104,8 @@ class UpfBench(RecordingBench[TransferPacket]):
         #: Its node id as it was found, and all that it has had.
         self._home, self._ids = 0, {0}
         self._endpoint = Endpoint(definitions.types, vehicle)
+        #: Node id of a controller or a trigger -> what is sent to it.
+        self._overheard: dict[int, Endpoint] = {}
         self._numbers: dict[tuple[int, str], int] = {}
         #: Frames of ours, some of them spoilt, that leave before others.
         self._spoilt: list[bytes] = []
@@ -113,9 +115,31 @@ class UpfBench(RecordingBench[TransferPacket]):
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         self.at(now)
+        if self.device is A_CONTROLLER:
+            self._overhear(data, now)
         heard = self._endpoint.receive(data, now)
         if heard is None:
             return
+        one = self._take(heard, data, now)
+        if heard.source == self.node and one.kind == NODE_STATUS:
+            self.device_is_up(one.values["uptime_sec"], 2.0**32)
+        if heard.kind is TransferKind.REQUEST:
+            self._answer(heard)
+        elif heard.name == ALLOCATION and self.gives_out:
+            self._allocate(heard)
+        elif heard.source and (heard.name == names.TRIGGER_STATUS or heard.source == self.node):
+            self._overheard.setdefault(
+                heard.source, Endpoint(self.definitions.types, heard.source)
+            )
+
+    def _overhear(self, data: bytes, now: float) -> None:
+        """What controller and triggers ask each other."""
+        for endpoint in self._overheard.values():
+            told = endpoint.receive(data, now)
+            if told is not None and told.name == names.TRIGGER_SERVICE:
+                self._take(told, data, now)
+
+    def _take(self, heard: ReceivedTransfer, data: bytes, now: float) -> TransferPacket:
         text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
         label = (
             heard.name
@@ -128,12 +152,7 @@ class UpfBench(RecordingBench[TransferPacket]):
         if heard.source == self.node:
             self.heard.append(one)
             self.heard_at = now
-            if one.kind == NODE_STATUS:
-                self.device_is_up(one.values["uptime_sec"], 2.0**32)
-        if heard.kind is TransferKind.REQUEST:
-            self._answer(heard)
-        elif heard.name == ALLOCATION and self.gives_out:
-            self._allocate(heard)
+        return one
 
     def stream_ended(self, stream: Hashable) -> None:
         pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
@@ -30,6 +31,7 @@ from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.devices import OPERATIONAL, mode_name
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan import time_sync
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID
 
 DOCUMENT = "Flyfire UPF UAVCAN protocol V1.0"
 WATCHED = 5.0
@@ -40,6 +42,8 @@ _SHARE, _LEAST = 0.25, 0.02
 #: Set for a trial, ms.
 _NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
 _UNKNOWN = "No Such Parameter"
+#: State and request, which one change makes, are at most so far apart, s.
+_UNDER_WAY = 0.3
 #: It is ready so long after a restart at the latest, s.
 READY_WITHIN = 15.0
 #: Microseconds since 1970.
@@ -102,6 +106,9 @@ def node_id(bench: UpfBench) -> Trial:
     default = yield from bench.value(p.STATIC_NODE_ID, "default_value")
     if default != bench.device.node_id:
         raise failed(f"its static node id as delivered is {p.words(default) or 'not reported'}")
+    most = yield from bench.value(p.STATIC_NODE_ID, "max_value")
+    if isinstance(most, int) and most > HIGHEST_NODE_ID:
+        raise failed(f"its static node id may be {most} (need at most {HIGHEST_NODE_ID})")
     return f"as delivered {default}; it is {bench.node}"
 
 
@@ -325,7 +332,24 @@ def _blocks_at_start(bench: UpfBench) -> Trial:
 
 def _releases_when_ready(bench: UpfBench) -> Trial:
     yield from ()
-    return _asked(bench, "TYPE_FLIGHT_BLOCK_RELEASE", ParachuteState.READY)
+    text = _asked(bench, "TYPE_FLIGHT_BLOCK_RELEASE", ParachuteState.READY)
+    is_ready = released = math.inf
+    starting = False
+    for one in bench.watched:
+        if one.kind == names.PARACHUTE_STATUS:
+            state = bench.state_in(one)
+            starting = starting or state is ParachuteState.NOT_READY
+            if state is ParachuteState.READY and starting:
+                is_ready = min(is_ready, one.at)
+            if state is ParachuteState.NOT_READY and one.at > released + _UNDER_WAY:
+                raise failed("it released the block, and is still NOT_READY", [one.packet])
+        elif one.kind == names.VEHICLE_SERVICE and starting:
+            asked = bench.definitions.type_name(one.kind, one.values)
+            if asked == "TYPE_FLIGHT_BLOCK_RELEASE":
+                released = min(released, one.at)
+            elif asked == "TYPE_FLIGHT_BLOCK" and one.at > is_ready + _UNDER_WAY:
+                raise failed(f"it is READY, and asks for {asked}", [one.packet])
+    return text
 
 
 def _asked(bench: UpfBench, what: str, state: ParachuteState) -> str:
@@ -357,6 +381,8 @@ def _kept_by_opcode(bench: UpfBench) -> Trial:
         yield from bench.put_back(auto)
         yield from bench.put_back(name)
         raise
+    # It need not keep that the switch is off.
+    yield from bench.set(auto, False)
     yield from bench.set(name, _NODE_INTERVAL)
     yield from bench.save()
     kept = yield from _after_restart(bench, name)
