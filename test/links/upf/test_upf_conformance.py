@@ -34,7 +34,7 @@ from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import ControllerEvent
-from chute_ros.links.upf.simulator.broken import BREAKS
+from chute_ros.links.upf.simulator.broken import BREAKS, simulated_controller
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
@@ -172,6 +172,17 @@ def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
     line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
     line.run()
     assert of(line, Verdict.FAILED) == [clause]
+
+
+def test_a_launch_before_a_trigger_that_seldom_reports_fails() -> None:
+    trigger = UpfTrigger(DEFINITIONS)
+    trigger.status_interval = 1.0
+    controller = simulated_controller(DEFINITIONS, ControllerSettings(), "launched-after-trigger")
+    bench = UpfBench(DEFINITIONS, Risk.FIRES)
+    bus = UpfBus([controller, trigger])
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
+    line.run()
+    assert of(line, Verdict.FAILED) == ["launched-after-trigger"]
 
 
 class ForgetfulTrigger(UpfTrigger):

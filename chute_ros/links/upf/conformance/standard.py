@@ -315,7 +315,7 @@ def _restart(bench: UpfBench) -> Trial:
         raise failed("RestartNode is not ok")
     is_up = yield from bench.is_up(READY_WITHIN)
     up = bench.device.up or "received"
-    yield from bench.watch_on(0.5)
+    yield from bench.watch_on(1.0)
     yield Wait(bench.now + LONGEST_STATUS, lambda: bench.starts > starts)
     bench.watched = bench.heard[since:]
     if not is_up:
