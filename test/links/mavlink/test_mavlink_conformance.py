@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import cycle
 
 import pytest
@@ -20,8 +21,9 @@ from chute_ros.links.mavlink.simulator.broken import BREAKS
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import DeploymentTrigger, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.frames import FrameDecoder
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
+from chute_ros.sim.mavlink_device import Params
 
 NAMES = [one.name for one in CLAUSES]
 OF_SIGNING = ["unsigned-refused", "wrong-key-refused", "replay-refused", "signed-answers"]
@@ -103,9 +105,130 @@ def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
     del device.default_intervals[dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC]
     run = Run(device).to()
     lacks = ["request-information", "information-texts", "set-interval", "interval-told"]
-    lacks += ["interval-default", "interval-stop", "automatic-release", "release"]
+    lacks += ["interval-default", "interval-stop", "heartbeat-constant"]
+    lacks += ["automatic-release", "release"]
     assert run.of(Verdict.NOT_SUPPORTED) == lacks
     assert run.of(Verdict.FAILED) == []
+
+
+class SlowParachute(ParachuteDevice):
+    """Answers each command with IN_PROGRESS, and carries it out so much later (s). at_once: the
+    result comes together with that first answer."""
+
+    takes = 0.3
+
+    def __init__(self, settings: ParachuteSettings) -> None:
+        super().__init__(settings, [])
+        self._waiting: list[tuple[float, Frame]] = []
+
+    def _command(self, frame: Frame) -> None:
+        self.acknowledge(frame, int(dialect.MAV_RESULT_IN_PROGRESS))
+        self._waiting.append((self.now + self.takes, frame))
+        self.step(self.now)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        due = [frame for at, frame in self._waiting if at <= now]
+        self._waiting = [(at, frame) for at, frame in self._waiting if at > now]
+        for frame in due:
+            super()._command(frame)
+
+    def next_step(self) -> float:
+        return min((at for at, _ in self._waiting), default=math.inf)
+
+
+@pytest.mark.parametrize("takes", [0.0, 0.3, 2.5])
+def test_a_device_that_is_in_progress_first_is_judged_by_its_result(takes: float) -> None:
+    device = SlowParachute(ParachuteSettings())
+    device.takes = takes
+    run = Run(device).to()
+    assert run.of(Verdict.FAILED) == []
+    assert {"release", "released-stays", "arm-sources"} <= {*run.of(Verdict.PASSED)}
+
+
+def test_a_device_that_stays_in_progress_has_no_result() -> None:
+    device = sound()
+    device.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda _: int(dialect.MAV_RESULT_IN_PROGRESS)
+    run = Run(device).to()
+    assert run.results["release"].verdict is Verdict.FAILED
+    assert run.results["release"].why.endswith("IN_PROGRESS, and no result within 5 s")
+    assert "release-disarmed" in run.of(Verdict.FAILED)
+
+
+# -- what shows only at a second look -------------------------------------------------------------
+
+
+class SlyParachute(ParachuteDevice):
+    """Wrong in a way that no first answer and no first status shows. does: in which."""
+
+    def __init__(self, does: str) -> None:
+        super().__init__(ParachuteSettings(), [])
+        self.does, self._at = does, math.inf
+        right = self.commands[dialect.MAV_CMD_DO_PARACHUTE]
+        self.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda params: self._do(params, right)
+
+    def _do(self, params: Params, right: Callable[[Params], int]) -> int:
+        result = right(params)
+        late = {
+            "releases after its refusal": dialect.MAV_RESULT_FAILED,
+            "takes its release back": dialect.MAV_RESULT_ACCEPTED,
+            "names another trigger": dialect.MAV_RESULT_ACCEPTED,
+        }
+        if params[0] == dialect.PARACHUTE_RELEASE and result == late.get(self.does):
+            self._at = self.now + 1.0
+        if params[0] == dialect.PARACHUTE_ENABLE and self.does == "arms all by action 1":
+            self.armed = TriggerFlags(255)
+        if params[0] == dialect.PARACHUTE_DISABLE and self.does == "disarms all by action 0":
+            self.armed = TriggerFlags(0)
+        return result
+
+    def carry_out(self, command: object) -> int:
+        if command.get_type() != "COMMAND_INT":  # type: ignore[attr-defined]
+            return super().carry_out(command)
+        params = (command.param1, command.param2, *[0.0] * 5)  # type: ignore[attr-defined]
+        number = command.command  # type: ignore[attr-defined]
+        if number == dialect.MAV_CMD_SET_PARACHUTE_ARM and self.does == "arms without the mask":
+            self.armed = TriggerFlags(int(params[0]))
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        if number == dialect.MAV_CMD_DO_PARACHUTE and self.does == "releases by COMMAND_INT":
+            self.deploy(DeploymentTrigger.MAVLINK)
+            return int(dialect.MAV_RESULT_FAILED)
+        return self.commands[number](params)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        if now >= self._at:
+            self._at = math.inf
+            self.deployment = {
+                "takes its release back": DeploymentTrigger.NONE,
+                "names another trigger": DeploymentTrigger.ATS,
+            }.get(self.does, DeploymentTrigger.MAVLINK)
+        if self.deployment is not DeploymentTrigger.NONE and self.does == "reports no more":
+            self._due.pop(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS, None)
+
+    def next_step(self) -> float:
+        return self._at
+
+
+@pytest.mark.parametrize(
+    ("does", "clause"),
+    [
+        ("releases after its refusal", "release-disarmed"),
+        ("releases by COMMAND_INT", "release-disarmed"),
+        ("arms without the mask", "arm-mask"),
+        ("arms all by action 1", "automatic-release"),
+        ("disarms all by action 0", "automatic-release"),
+        ("takes its release back", "released-stays"),
+        ("names another trigger", "released-stays"),
+        ("reports no more", "released-stays"),
+    ],
+)
+def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
+    assert Run(SlyParachute(does)).to().of(Verdict.FAILED) == [clause]
+
+
+def test_a_device_that_obeys_command_int_as_well_passes() -> None:
+    assert Run(SlyParachute("")).to().of(Verdict.FAILED) == []
 
 
 # -- whatever it is told -------------------------------------------------------------------------

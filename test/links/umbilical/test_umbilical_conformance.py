@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from itertools import cycle
 
 import pytest
@@ -126,6 +126,55 @@ def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
     assert run.of(Verdict.FAILED) == [name]
     assert run.results[name].why
     assert run.results[name].proof, "packets that show it"
+
+
+# -- what shows only at a second look -------------------------------------------------------------
+
+
+class WaywardComputer(FlightComputer):
+    """Wrong in a way that no first line shows. does: in which."""
+
+    does = ""
+    _since = math.inf
+
+    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        if self.does == "takes a newline for a bracket":
+            data = data.replace(b"\n", b">")
+        super().receive(data, now, stream)
+
+    def _telemetry(self) -> None:
+        flags = self.flight.flags
+        if flags.get(self.does):
+            self._since = min(self._since, self.now)
+            if self.now > self._since + 1.0:
+                flags[self.does], self._since = 0, math.inf
+        unheard = bool(self.heartbeats) and self.now - self.heartbeats[-1] > 10.0
+        if self.does == "opens the MAV" and unheard:
+            flags["mav_open"] = 1
+        super()._telemetry()
+
+
+@pytest.mark.parametrize(
+    ("does", "clauses"),
+    [
+        ("mav_open", ["open-mav"]),
+        ("sv_open", ["open-sv"]),
+        ("ssa_drogue_deployed", ["drogue"]),
+        ("opens the MAV", ["unconnected"]),
+        ("takes a newline for a bracket", ["nearly-arms", "nearly-fires"]),
+        ("", []),
+    ],
+)
+def test_what_shows_at_a_second_look_fails(does: str, clauses: list[str]) -> None:
+    device = WaywardComputer(FlightComputerSettings(), REFERENCE)
+    device.does = does
+    assert Run(device).to().of(Verdict.FAILED) == clauses
+
+
+def test_a_magnetometer_in_gauss_fails() -> None:
+    device = sound()
+    device.overrides |= {"mag_x": 0.1825, "mag_y": -0.048, "mag_z": -0.476}
+    assert Run(device).to().of(Verdict.FAILED) == ["magnetometer"]
 
 
 # -- whatever it is told -------------------------------------------------------------------------

@@ -3,6 +3,7 @@ time."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import cycle
@@ -32,13 +33,15 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.simulator.broken import BREAKS
+from chute_ros.links.upf.protocol.machine import ControllerEvent
+from chute_ros.links.upf.simulator.broken import BREAKS, simulated_controller
 from chute_ros.links.upf.simulator.bus import UpfBus
-from chute_ros.links.upf.simulator.controller import UpfController
+from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings
+from chute_ros.links.upf.simulator.node import NODE_STATUS, NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.calls import Call
 from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 from chute_ros.transport.data_types import load_data_types
 
@@ -86,6 +89,129 @@ def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
     result = results(line)[name]
     assert result.why
     assert result.proof, "packets that show it"
+
+
+# -- what shows only at a second look -------------------------------------------------------------
+
+_S = ParachuteState
+
+
+class SlyController(UpfController):
+    """Wrong in a way that no first answer shows. does: in which."""
+
+    def __init__(self, does: str) -> None:
+        super().__init__(DEFINITIONS, ControllerSettings(self_test=2.0))
+        self.does, self._asks_at = does, math.inf
+        if does == "says that it saves":
+            self.services[bus_requests.EXECUTE_OPCODE] = lambda _: {"ok": True}
+            right = self.memory.set
+
+            def keep(name: str, wanted: p.Value) -> bool:
+                saved = dict(self.memory.saved)
+                done = right(name, wanted)
+                if name == p.AUTO_SAVE and not wanted:
+                    self.memory.saved = saved
+                return done
+
+            self.memory.set = keep  # type: ignore[method-assign]
+        if does == "takes node id 200":
+            answer = self.services[bus_requests.GET_SET]
+            self.services[bus_requests.GET_SET] = lambda request: {
+                **(answer(request) or {}),
+                "max_value": {"integer_value": 200},
+            }
+
+    def reboot(self) -> None:
+        super().reboot()
+        self._asks_at = self.now + 0.5
+
+    def decide(self, name: str) -> str:
+        result = super().decide(name)
+        if self.does == "does what it rejects" and name == "TYPE_TAKEOFF" and result == "REJECTED":
+            self._move(ControllerEvent.TAKEOFF)
+        if name == "TYPE_DEPLOY":
+            if self.does == "fires though disabled" and not self.switch(p.ENABLE_PARACHUTE):
+                self._fire(self.now)
+            if self.does == "needs its APS" and not self.switch(p.ENABLE_APS):
+                self._launch_at = math.nan
+                return "REJECTED"
+        return result
+
+    def launch(self, cause: str, by_aps: bool = False) -> None:
+        if self.does == "commands its trigger first":
+            values = self.definitions.request(names.TRIGGER_SERVICE, "TYPE_LAUNCH")
+            for node_id in self._peers.triggers:
+                self._start(Call(node_id, names.TRIGGER_SERVICE, values, 2))
+        super().launch(cause, by_aps)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        early = self.does == "releases the block early" and self.state is _S.NOT_READY
+        again = self.does == "blocks while READY" and self.state is _S.READY
+        if now >= self._asks_at and (early or again):
+            self._asks_at = now + 0.4
+            self._ask_vehicle("TYPE_FLIGHT_BLOCK" if again else "TYPE_FLIGHT_BLOCK_RELEASE")
+
+
+@pytest.mark.parametrize(
+    ("does", "clause"),
+    [
+        ("says that it saves", "auto-save"),
+        ("takes node id 200", "node-id"),
+        ("does what it rejects", "exclude-takeoff"),
+        ("fires though disabled", "disabled"),
+        ("needs its APS", "deploy"),
+        ("commands its trigger first", "kill-first"),
+        ("releases the block early", "release-when-ready"),
+        ("blocks while READY", "release-when-ready"),
+    ],
+)
+def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
+    bench = UpfBench(DEFINITIONS, Risk.FIRES)
+    bus = UpfBus([SlyController(does), UpfTrigger(DEFINITIONS)])
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
+    line.run()
+    assert of(line, Verdict.FAILED) == [clause]
+
+
+def test_a_launch_before_a_trigger_that_seldom_reports_fails() -> None:
+    trigger = UpfTrigger(DEFINITIONS)
+    trigger.status_interval = 1.0
+    controller = simulated_controller(DEFINITIONS, ControllerSettings(), "launched-after-trigger")
+    bench = UpfBench(DEFINITIONS, Risk.FIRES)
+    bus = UpfBus([controller, trigger])
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
+    line.run()
+    assert of(line, Verdict.FAILED) == ["launched-after-trigger"]
+
+
+class ForgetfulTrigger(UpfTrigger):
+    """Says for a second that it has fired. then: what it does then."""
+
+    then = ""
+    _fired_at = math.inf
+
+    def fire(self, cause: str) -> None:
+        super().fire(cause)
+        self._fired_at = min(self._fired_at, self.now)
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        if now >= self._fired_at + 1.0 and self.fired:
+            if self.then == "says no more":
+                self.broadcasts.pop(names.TRIGGER_STATUS, None)
+            else:
+                self.fired = False
+
+
+@pytest.mark.parametrize("then", ["says no more", "says that it has not"])
+def test_a_trigger_that_forgets_that_it_has_fired_fails(then: str) -> None:
+    device = ForgetfulTrigger(DEFINITIONS)
+    device.then = then
+    bench = UpfBench(DEFINITIONS, Risk.FIRES, device=A_TRIGGER)
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, (TRIGGER,))), UpfBus([device]))
+    line.run()
+    assert of(line, Verdict.FAILED) == ["trigger-is-launched"]
 
 
 # -- whatever it is told -------------------------------------------------------------------------
@@ -224,6 +350,81 @@ def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start()
     line = VirtualLine(Session(run.bench, [restart], Allowed()), run.bus)
     line.run()
     assert of(line, Verdict.FAILED) == ["restart"]
+
+
+class StartsLate(UpfNode):
+    """Answers RestartNode, and starts anew a moment later, so that its answer can leave it."""
+
+    _restarts_at = math.inf
+
+    def reboot(self) -> None:
+        if math.isnan(self.booted_at) or self.now >= self._restarts_at:
+            self._restarts_at = math.inf
+            super().reboot()
+        else:
+            self._restarts_at = self.now + 0.3
+
+    def step(self, now: float) -> None:
+        if now >= self._restarts_at:
+            self.reboot()
+        super().step(now)
+
+    def next_step(self) -> float:
+        return min(super().next_step(), self._restarts_at)
+
+
+class LateTrigger(StartsLate, UpfTrigger):
+    """A trigger."""
+
+
+class LateRestart(StartsLate, UpfController):
+    """A controller. intervals: those of its messages hold from the next start on."""
+
+    intervals = False
+
+    def reboot(self) -> None:
+        super().reboot()
+        if self.booted_at == self.now:
+            self._at_start = dict(self.values)
+
+    def _interval(self, name: str) -> float:
+        values = self._at_start if self.intervals else self.values
+        return float(values[name]) / 1000.0
+
+
+@pytest.mark.parametrize("intervals", [False, True])
+def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
+    run = Run(Risk.NONE)
+    device = LateRestart(DEFINITIONS)
+    device.intervals = intervals
+    line = VirtualLine(run.session, UpfBus([device, run.trigger]))
+    line.run()
+    assert of(line, Verdict.FAILED) == []
+    found = results(line)
+    assert found["auto-save"].verdict is Verdict.PASSED
+    for name in ("node-interval", "parachute-interval"):
+        assert found[name].verdict is Verdict.PASSED
+        assert found[name].why.endswith("after a restart") is intervals
+    assert device.values == device.saved == CONTROLLER_PARAMETERS
+    assert problem(line) == ""
+
+
+@pytest.mark.parametrize("options", [(DNA,), (TRIGGER, DNA)])
+def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
+    options: tuple[str, ...],
+) -> None:
+    """Given a device that has no node id a moment after it has answered RestartNode."""
+    run = Run(Risk.FIRES, *options)
+    late = LateTrigger(DEFINITIONS) if TRIGGER in options else LateRestart(DEFINITIONS)
+    kind = A_TRIGGER if TRIGGER in options else A_CONTROLLER
+    bench = UpfBench(DEFINITIONS, Risk.FIRES, dna=True, device=kind)
+    peer = run.controller if TRIGGER in options else run.trigger
+    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, options)), UpfBus([late, peer]))
+    line.run()
+    assert of(line, Verdict.FAILED) == []
+    passed = {"trigger-dna", "trigger-dna-forgets"} if TRIGGER in options else {"dna"}
+    assert passed <= {*of(line, Verdict.PASSED)}
+    assert problem(line) == ""
 
 
 # -- what it must not do -------------------------------------------------------------------------

@@ -11,6 +11,8 @@ from chute_ros.model import TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 
 _UNKNOWN_SOURCE = 256
+#: What is not the automatic release.
+_BY_SOMEBODY = (TriggerFlags.MANUAL, TriggerFlags.FC, TriggerFlags.OFFBOARD)
 _DOES = "it arms and disarms trigger sources, also those that fire by themselves"
 
 
@@ -64,8 +66,23 @@ def _mask(bench: MavlinkBench) -> Trial:
         select &= has
         expected = before & ~select | arm & select
         yield from _set(bench, arm, select, expected, f"first {arm:#010b}, second {select:#010b}")
+    yield from _by_command_int(bench, has)
     yield from bench.disarm_each()
     return "bits that the second parameter does not select stay"
+
+
+def _by_command_int(bench: MavlinkBench, has: int) -> Trial:
+    """A device that takes a COMMAND_INT does the same by it."""
+    arm, select = int(TriggerFlags.ATS), has & int(TriggerFlags.ATS | TriggerFlags.FC)
+    before = int((yield from _armed(bench)))
+    bench.send(bench.command_int(ARM, arm, select))
+    answer = yield from bench.answer(ARM)
+    taken = answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED
+    expected = before & ~select | arm & select if taken else before
+    if (armed := int((yield from _armed(bench)))) != expected:
+        what = f"COMMAND_INT, first {arm:#010b}, second {select:#010b}"
+        raise failed(f"{what}: arm_status is {armed:#010b} (need {expected:#010b})")
+    return ""
 
 
 def _nothing(bench: MavlinkBench) -> Trial:
@@ -112,6 +129,10 @@ def _automatic(bench: MavlinkBench) -> Trial:
         (dialect.PARACHUTE_ENABLE, TriggerFlags.ATS),
         (dialect.PARACHUTE_DISABLE, TriggerFlags(0)),
     ):
+        if action == dialect.PARACHUTE_DISABLE:
+            for source in _BY_SOMEBODY:
+                yield from bench.command(ARM, int(source), int(source))
+        before = TriggerFlags(int((yield from _armed(bench))))
         answer = yield from bench.command(dialect.MAV_CMD_DO_PARACHUTE, action)
         if answer is None:
             raise failed(f"action {action} is not answered")
@@ -120,6 +141,10 @@ def _automatic(bench: MavlinkBench) -> Trial:
         armed = TriggerFlags(int((yield from _armed(bench))))
         if armed & TriggerFlags.ATS != expected:
             raise failed(f"after action {action} arm_status is {int(armed)}")
+        if changed := [str(one.name) for one in _BY_SOMEBODY if (armed ^ before) & one]:
+            names = ", ".join(changed)
+            raise failed(f"action {action} is for the automatic release, and changes {names}")
+    yield from bench.disarm_each()
     return "1 arms ATS, 0 disarms it"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import ReceivedPacket, RecordingBench
+from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
@@ -22,6 +22,10 @@ _FOUND_WITHIN = 10.0
 #: An answer comes within this, s; a command is sent so often before it counts as not answered.
 ANSWER = 1.0
 TRIES = 3
+#: The result follows an answer IN_PROGRESS within this, s.
+RESULT_WITHIN = 5.0
+#: An answer that comes twice does so within this, s: it is none to the next command.
+_AGAIN = 0.05
 #: A status comes by its stream at the latest, s.
 STATUS_WITHIN = 3.0
 #: A status is streamed at nominally 1 Hz, us.
@@ -73,6 +77,8 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         self._beat_at = -math.inf
         #: It was told to send its status otherwise than it does by itself.
         self._other_interval = False
+        #: From which of heard on it was told to release; negative: it was not, or did not.
+        self.released_from = -1
 
     # -- as the session wants it ------------------------------------------------------------------
 
@@ -148,6 +154,13 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         padded = (*params, *[0.0] * (7 - len(params)))
         return dialect.MAVLink_command_long_message(
             system, component, command, confirmation, *padded
+        )
+
+    def command_int(self, command: int, *params: float) -> Any:
+        """COMMAND_INT to the device."""
+        padded = (*params, *[0.0] * (4 - len(params)))
+        return dialect.MAVLink_command_int_message(
+            self.system, self.component, 0, command, 0, 0, *padded, 0, 0, 0.0
         )
 
     def _packed(
@@ -236,9 +249,11 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
     def status_every(self, interval: int) -> Any:
         """The answer (ReceivedFrame) as PARACHUTE_STATUS is to come each so many us (-1: never,
         0: as delivered); None: none came."""
+        # Until its answer has been looked at, it may have done so.
+        before, self._other_interval = self._other_interval, True
         answer = yield from self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _STATUS, interval)
-        if answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED:
-            self._other_interval = interval != 0
+        taken = answer is not None and answer.message.result == dialect.MAV_RESULT_ACCEPTED
+        self._other_interval = interval != 0 if taken else before
         return answer
 
     def status_as_before(self) -> Trial:
@@ -270,12 +285,24 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         return None
 
     def answer(self, command: int, within: float = ANSWER) -> Any:
-        """The next answer to this command; None: none came."""
-        return (
-            yield from self.wait_for(
-                "COMMAND_ACK", within, lambda one: one.message.command == command
-            )
-        )
+        """The next result of this command, or IN_PROGRESS where none follows it; None: no answer
+        came."""
+
+        def answers(one: ReceivedFrame) -> bool:
+            return one.kind == "COMMAND_ACK" and one.message.command == command
+
+        since = len(self.heard)
+        first = first_of(self.heard, since, answers)
+        yield Wait(self.now + within, first)
+        if (answer := first()) is None:
+            return None
+        if in_progress(answer):
+            # The result may have come together with it.
+            result = first_of(self.heard, since, lambda one: answers(one) and not in_progress(one))
+            yield Wait(self.now + RESULT_WITHIN, result)
+            answer = result() or answer
+        yield from self.watch_on(_AGAIN)
+        return answer
 
     def accepted(self, command: int, *params: float) -> Any:
         """The same; it must be accepted."""
@@ -311,9 +338,15 @@ def entry_name(enumeration: str, number: int) -> str:
     return known.name if known else f"{enumeration} {number}"
 
 
+def in_progress(answer: ReceivedFrame) -> bool:
+    """The result is still to come."""
+    return bool(answer.message.result == dialect.MAV_RESULT_IN_PROGRESS)
+
+
 def result_of(answer: ReceivedFrame) -> str:
     """The result of an answer by its name."""
-    return entry_name("MAV_RESULT", answer.message.result)
+    name = entry_name("MAV_RESULT", answer.message.result)
+    return f"{name}, and no result within {RESULT_WITHIN:g} s" if in_progress(answer) else name
 
 
 def refused(answer: ReceivedFrame | None, what: str, besides: str = "") -> str:
@@ -322,4 +355,6 @@ def refused(answer: ReceivedFrame | None, what: str, besides: str = "") -> str:
         raise failed(f"{what} is not answered")
     if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
         raise failed(f"{what} is ACCEPTED{besides}")
+    if in_progress(answer):
+        raise failed(f"{what} is answered with {result_of(answer)}")
     return f"answered with {result_of(answer)}"

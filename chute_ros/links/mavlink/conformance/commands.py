@@ -6,7 +6,13 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from chute_ros.conformance.clause import READS, SOAK, Trial, Wait, failed, not_supported, not_tried
-from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.bench import (
+    RESULT_WITHIN,
+    US,
+    MavlinkBench,
+    in_progress,
+    result_of,
+)
 from chute_ros.links.mavlink.conformance.connection import WATCHED, nominal
 from chute_ros.links.mavlink.conformance.document import (
     COMMAND,
@@ -91,15 +97,24 @@ def _two_senders(bench: MavlinkBench) -> Trial:
 
 
 def _command_int(bench: MavlinkBench) -> Trial:
-    bench.send(
-        dialect.MAVLink_command_int_message(
-            bench.system, bench.component, 0, _REQUEST, 0, 0, _STATUS, 0, 0, 0, 0, 0, 0
-        )
-    )
+    bench.send(bench.command_int(_REQUEST, _STATUS))
     answer = yield from bench.answer(_REQUEST)
     if answer is None:
         raise failed("a COMMAND_INT is not answered")
     return f"answered with {result_of(answer)}"
+
+
+def _one_answer(bench: MavlinkBench) -> Trial:
+    since = len(bench.heard)
+    if (yield from bench.command(_REQUEST, _STATUS, tries=1)) is None:
+        raise failed("a command is not answered")
+    yield from bench.watch_on(_SILENCE)
+    answers = (one for one in bench.heard[since:] if one.kind == "COMMAND_ACK")
+    told = [one for one in answers if not in_progress(one)]
+    if len(told) > 1:
+        names = ", ".join(map(result_of, told))
+        raise failed(f"one command has {len(told)} results: {names}", [one.packet for one in told])
+    return result_of(told[0]) if told else "no result"
 
 
 def _sent_again(bench: MavlinkBench) -> Trial:
@@ -142,7 +157,7 @@ def _reordered(bench: MavlinkBench) -> Trial:
 
     bench.send(bench.command_long(_REQUEST, _STATUS), change=hold)
     bench.send(bench.command_long(_UNKNOWN), change=lambda frame: (frame, *held))
-    until = bench.now + 1.0
+    until = bench.now + RESULT_WITHIN
     since, both = len(bench.heard), {_REQUEST, _UNKNOWN}
     yield Wait(until, lambda: both <= _answered(bench, since))
     if left := both - _answered(bench, since):
@@ -151,8 +166,9 @@ def _reordered(bench: MavlinkBench) -> Trial:
 
 
 def _answered(bench: MavlinkBench, since: int) -> set[int]:
+    """The commands whose results came."""
     answers = (one for one in bench.heard[since:] if one.kind == "COMMAND_ACK")
-    return {one.message.command for one in answers}
+    return {one.message.command for one in answers if not in_progress(one)}
 
 
 def _noise(bench: MavlinkBench) -> Trial:
@@ -278,6 +294,7 @@ CLAUSES: tuple[MavlinkClause, ...] = (
     _commands("answer-addressed", "an answer is for who gave the command", _answer_addressed),
     _commands("two-senders", "several may give commands, and each is answered", _two_senders),
     _commands("command-int", "a COMMAND_INT is answered, if only by a refusal", _command_int),
+    _commands("one-answer", "a command has one result", _one_answer),
     _commands(
         "sent-again",
         "a command that is sent again (confirmation) is answered again: the answer was lost",

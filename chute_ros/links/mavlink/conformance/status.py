@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from chute_ros.conformance.clause import ASKS, READS, Trial, failed, not_supported, not_tried
+from chute_ros.conformance.clause import (
+    ASKS,
+    READS,
+    DecidedError,
+    Trial,
+    failed,
+    not_supported,
+    not_tried,
+)
 from chute_ros.links.mavlink.conformance.bench import (
     STATUS_WITHIN,
     MavlinkBench,
@@ -23,6 +31,8 @@ _RESERVED = ErrorFlags.RESERVED_1 | ErrorFlags.RESERVED_2
 _FASTER, _AWAITED = 200_000, 6
 #: What a device has sent before it was told to stop comes within this, s.
 _UNDER_WAY = 0.5
+#: So long heartbeats are counted, s, and so many are due.
+_WHILE, _BEATS = 4.0, (2, 8)
 #: A clock may be off by this share, or this much, s.
 _CLOCK, _CLOCK_LEAST = 0.05, 0.1
 
@@ -113,6 +123,27 @@ def _interval_stop(bench: MavlinkBench) -> Trial:
     return f"none for {STATUS_WITHIN:g} s"
 
 
+def _heartbeat_constant(bench: MavlinkBench) -> Trial:
+    yield from bench.watch_once(WATCHED, "HEARTBEAT")
+    try:
+        nominal(bench, "HEARTBEAT")
+    except DecidedError as error:
+        raise not_tried("heartbeats do not come at nominally 1 Hz by themselves") from error
+    for interval, how in ((-1, "is stopped"), (_FASTER, "comes each 0.2 s")):
+        yield from _set(bench, interval)
+        since, low, high = len(bench.heard), *_BEATS
+        yield from bench.watch_on(_WHILE)
+        beats = sum(one.kind == "HEARTBEAT" for one in bench.heard[since:])
+        if not low <= beats <= high:
+            yield from bench.status_as_before()
+            raise failed(
+                f"PARACHUTE_STATUS {how}, and {beats} HEARTBEAT come in {_WHILE:g} s "
+                f"({low} to {high} are nominally 1 Hz)"
+            )
+    yield from bench.status_as_before()
+    return "as before while its status is stopped, and while it comes faster"
+
+
 def _interval_unknown(bench: MavlinkBench) -> Trial:
     command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
     answer = yield from bench.command(command, FOREIGN_MESSAGE, _FASTER)
@@ -201,6 +232,12 @@ CLAUSES = (
         "interval -1 stops it",
         _interval_stop,
         "it does not send its status for some seconds, and then as before",
+    ),
+    of(PARACHUTE, "Parachute Connection")(
+        "heartbeat-constant",
+        "the flow of heartbeats is constant, whatever interval its status has",
+        _heartbeat_constant,
+        "it does not send its status for some seconds, sends it faster, and then as before",
     ),
     _told(
         "interval-unknown",

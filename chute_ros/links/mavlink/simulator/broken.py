@@ -33,7 +33,7 @@ _NUMBER = slice(10 + 28, 10 + 30)
 #: One that is confused by a frame is deaf, or silent, for so long, s.
 _AFTER_DOUBLED, _AFTER_LOST, _AFTER_NOISE, _AFTER_CUT, _AFTER_V1 = 0.9, 2.9, 3.0, 3.3, 4.1
 #: It falls silent this long after its start, for so long, s.
-_PAUSES_AT, _PAUSES_FOR = 35.0, 5.0
+_PAUSES_AT, _PAUSES_FOR = 50.0, 5.0
 
 
 #: Clause -> the refusal of a frame that is overlooked.
@@ -147,6 +147,8 @@ class BrokenParachute(ParachuteDevice):
         if self._breaks == "unknown-command" and unknown:
             result = _ACCEPTED
         super().acknowledge(frame, result)
+        if self._breaks == "one-answer":
+            super().acknowledge(frame, int(dialect.MAV_RESULT_FAILED))
 
     def send(self, message: Any, version: int = 2) -> None:
         up = self.now - self.booted_at
@@ -157,6 +159,10 @@ class BrokenParachute(ParachuteDevice):
             self.encoder = FrameEncoder(self.system_id, self.component_id)
         old = self._breaks == "mavlink-2" and message.get_msgId() == _BEAT
         super().send(message, 1 if old else version)
+
+    def pause(self, message_id: int, paused: bool) -> None:
+        """It does not come, or comes again from now on."""
+        self._due[message_id] = math.inf if paused else self.now
 
     def send_later(self, after: float, message: Any) -> None:
         """So many s from now."""
@@ -296,6 +302,17 @@ def _set_without_effect(device: BrokenParachute) -> None:
     _answers(_GET, lambda of, params: _STATUS in told, tell, device)
 
 
+def _stops_all(device: BrokenParachute) -> None:
+    """An interval of -1 stops the heartbeat, too, until another one is set."""
+    right = device.commands[_SET]
+
+    def handle(params: Params) -> int:
+        device.pause(_BEAT, params[1] == -1)
+        return right(params)
+
+    device.commands[_SET] = handle
+
+
 def _another_interval(of: BrokenParachute, params: Params) -> None:
     of.after_acknowledgement.append(dialect.MAVLink_message_interval_message(_STATUS, 1_000_000))
 
@@ -352,6 +369,7 @@ def _in_itself(_: BrokenParachute) -> None:
 #: Clause -> what makes a sound device break it.
 BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
     "heartbeat-rate": partial(_rare, _BEAT),
+    "heartbeat-constant": _stops_all,
     "heartbeat-type": _field(_BEAT, "type", dialect.MAV_TYPE_ONBOARD_CONTROLLER),
     "heartbeat-fields": _field(_BEAT, "autopilot", dialect.MAV_AUTOPILOT_GENERIC),
     "component-id": _is_autopilot,
@@ -380,6 +398,7 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
             "answer-addressed",
             "two-senders",
             "command-int",
+            "one-answer",
             "sent-again",
             "doubled-frame",
             "lost-frames",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import dropwhile
+
 from chute_ros.conformance.clause import Risk, Trial, failed, not_tried
 from chute_ros.links.umbilical.conformance.bench import (
     SETTLES,
@@ -19,11 +21,25 @@ from chute_ros.links.umbilical.protocol.modes import IN_FLIGHT, FlightMode
 _ARMS = "it is key armed, and disarmed again"
 _MAY_ARM, _MAY = "it must not, but it may be ARMED", "it must not, but it may FIRE"
 #: Close to a command, and none: by their case, brackets or number. No two of them join to one.
-_NEARLY_ARMS = (b"KA", b"(KA)", b"<ka>", b"<kA>", b"<K>", b"<A>", b"<KAA>", b"< KA>", b"<KA")
+_NEARLY_ARMS = (
+    b"KA",
+    b"(KA)",
+    b"<ka>",
+    b"<kA>",
+    b"<K>",
+    b"<A>",
+    b"<KAA>",
+    b"< KA>",
+    b"<KA\n",
+    b"<KA",
+)
 _NEARLY_FIRES = (
     *(b"D", b"(D)", b"[d]", b"<DD>", b"< D>", b"<l>", b"(L)", b"L", b"<MS>", b"{M}", b"<v>"),
-    *(b"<0>", b"<5>", b"<A0>", b"<A4>", b"<a1>", b"1", b"<D"),
+    *(b"<0>", b"<5>", b"<A0>", b"<A4>", b"<a1>", b"1", b"<D\n", b"<D"),
 )
+#: What a command has moved stays for so long at least, s. A payload's flag may be a pulse.
+_KEEPS = 1.5
+_MOVED_FOR_GOOD = ("mav_open", "sv_open")
 _VALVES = {"mav": "MAV", "sv": "SV"}
 
 
@@ -98,7 +114,20 @@ def _moves(bench: UmbilicalBench, order: str, field: str, value: int) -> Trial:
     bench.unchanged(before, since, f"after {token}", (field,))
     if not took:
         raise failed(f"{token}: {field} is {bench.last(field)} (need {value})")
+    if field in _MOVED_FOR_GOOD:
+        yield from _stays(bench, since, token, field, value)
     return f"{field} {value} after {took}"
+
+
+def _stays(bench: UmbilicalBench, since: int, token: str, field: str, value: int) -> Trial:
+    """From this place of heard on the field became this value, and keeps it."""
+    yield from bench.watch_on(_KEEPS)
+    told = (one for one in bench.heard[since:] if field in one.values)
+    kept = dropwhile(lambda one: one.values[field] != value, told)
+    for one in kept:
+        if (now := one.values[field]) != value:
+            raise failed(f"{token}: {field} became {value}, and then {now}", [one.packet])
+    return ""
 
 
 def _opened(bench: UmbilicalBench, valve: str, is_open: int) -> Trial:
@@ -165,6 +194,7 @@ def _canopy(name: str) -> UmbilicalClause:
         bench.unchanged(before, since, f"after {token}", (flag, "flight_mode"))
         if not took:
             raise failed(f"{token}: {flag} stays 0, whatever has fired")
+        yield from _stays(bench, since, token, flag, 1)
         return f"{flag} 1 after {took}"
 
     text = f"{token} triggers the {name}, which {flag} shows"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from chute_ros.conformance.clause import READS, SOAK, Risk, Trial, failed, not_tried
@@ -11,6 +12,7 @@ from chute_ros.links.umbilical.conformance.bench import (
     LOG,
     PAUSE,
     SETTLES,
+    TELEM,
     ReceivedLine,
     UmbilicalBench,
 )
@@ -33,6 +35,8 @@ _BEATS = 5
 _HERE, _THERE = (42.441913, -76.4878), (-56.5, 78.65)
 _AIMS = "its target is changed, and set back in the end if it had one"
 _MUST_NOT = "it must do nothing"
+#: What no firmware moves because no <H> comes; some open the SV then.
+_NOT_BY_SILENCE = ("mav_open", "ssa_drogue_deployed", "ssa_main_deployed")
 _UNHEARD_DOES = "no <H> is sent for 18 s: some firmware opens the SV then, to vent the tank"
 _HARMLESS = tuple(f"<{one}>".encode() for one in ("Q", "Z", "QQ", "", "?"))
 #: No command is in any of them, whatever a device takes for a bracket or a letter.
@@ -128,6 +132,12 @@ def _goes_on(bench: UmbilicalBench) -> Trial:
     if longest > PAUSE:
         text = f"without <H> it pauses for {longest:.1f} s (need at most {PAUSE:g})"
         raise failed(text, [one.packet for one in watch.lines])
+    for earlier, later in pairwise(one for one in watch.lines if one.kind == TELEM):
+        for name in _NOT_BY_SILENCE:
+            was, now = earlier.values.get(name), later.values.get(name)
+            if None not in (was, now) and was != now:
+                both = [earlier.packet, later.packet]
+                raise failed(f"without <H> {name} went from {was} to {now}", both)
     return f"the longest pause {longest:.2f} s"
 
 

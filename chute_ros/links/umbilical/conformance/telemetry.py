@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from statistics import median
 from typing import Any
 
 from chute_ros.conformance.clause import READS, Trial, failed, not_tried
@@ -42,6 +43,8 @@ _RANGES: Mapping[str, tuple[float, float]] = {
 }
 #: At rest an accelerometer measures gravity, 9.8 m/s².
 _GRAVITY = (7.0, 13.0)
+#: A field of the earth that is weaker is none, µT.
+_WEAKEST = 5.0
 
 
 def _listened(bench: UmbilicalBench) -> Any:
@@ -122,6 +125,14 @@ def _at_rest(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
             raise failed(text, [one.packet])
 
 
+def _of_the_earth(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
+    """A magnetometer that is not there may report 0."""
+    fields = [math.hypot(*(one.values[f"mag_{axis}"] for axis in "xyz")) for one in lines]
+    if fields and 0.0 < (usual := median(fields)) < _WEAKEST:
+        text = f"on the ground it measures {usual:.2f} (need µT: that of the earth is 25 to 65)"
+        raise failed(text, [one.packet for one in lines[:1]])
+
+
 def _of_the_day(bench: UmbilicalBench, lines: Sequence[ReceivedLine]) -> None:
     for earlier, later in pairwise(lines):
         before, after = earlier.values["timestamp"], later.values["timestamp"]
@@ -183,7 +194,12 @@ CLAUSES: tuple[UmbilicalClause, ...] = (
         "timestamp",
         look=_of_the_day,
     ),
-    _field("magnetometer", "mag_x, mag_y, mag_z are f32", "mag_x", "mag_y", "mag_z"),
+    _field(
+        "magnetometer",
+        "mag_x, mag_y, mag_z are f32, in µT",
+        *("mag_x", "mag_y", "mag_z"),
+        look=_of_the_earth,
+    ),
     _field(
         "accelerometer",
         "accel_x, accel_y, accel_z are f32, in m/s²",

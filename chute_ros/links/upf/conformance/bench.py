@@ -30,6 +30,10 @@ _FOUND_WITHIN = 10.0
 #: An answer comes within this, s; a call is made so often before it counts as not answered.
 ANSWER = 0.5
 TRIES = 3
+#: DroneCAN: a node tells its status at least so often, s.
+LONGEST_STATUS = 1.0
+#: It starts anew so long after it was told to at the latest, s.
+_STARTS_WITHIN = 5.0
 #: A state is broadcast at the latest after this, s.
 STATUS_WITHIN = 3.0
 #: The option of clauses that take the device's node id from it, and how long it may be away, s.
@@ -100,6 +104,8 @@ class UpfBench(RecordingBench[TransferPacket]):
         #: Its node id as it was found, and all that it has had.
         self._home, self._ids = 0, {0}
         self._endpoint = Endpoint(definitions.types, vehicle)
+        #: Node id of a controller or a trigger -> what is sent to it.
+        self._overheard: dict[int, Endpoint] = {}
         self._numbers: dict[tuple[int, str], int] = {}
         #: Frames of ours, some of them spoilt, that leave before others.
         self._spoilt: list[bytes] = []
@@ -109,9 +115,31 @@ class UpfBench(RecordingBench[TransferPacket]):
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         self.at(now)
+        if self.device is A_CONTROLLER:
+            self._overhear(data, now)
         heard = self._endpoint.receive(data, now)
         if heard is None:
             return
+        one = self._take(heard, data, now)
+        if heard.source == self.node and one.kind == NODE_STATUS:
+            self.device_is_up(one.values["uptime_sec"], 2.0**32)
+        if heard.kind is TransferKind.REQUEST:
+            self._answer(heard)
+        elif heard.name == ALLOCATION and self.gives_out:
+            self._allocate(heard)
+        elif heard.source and (heard.name == names.TRIGGER_STATUS or heard.source == self.node):
+            self._overheard.setdefault(
+                heard.source, Endpoint(self.definitions.types, heard.source)
+            )
+
+    def _overhear(self, data: bytes, now: float) -> None:
+        """What controller and triggers ask each other."""
+        for endpoint in self._overheard.values():
+            told = endpoint.receive(data, now)
+            if told is not None and told.name == names.TRIGGER_SERVICE:
+                self._take(told, data, now)
+
+    def _take(self, heard: ReceivedTransfer, data: bytes, now: float) -> TransferPacket:
         text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
         label = (
             heard.name
@@ -124,12 +152,7 @@ class UpfBench(RecordingBench[TransferPacket]):
         if heard.source == self.node:
             self.heard.append(one)
             self.heard_at = now
-            if one.kind == NODE_STATUS:
-                self.device_is_up(one.values["uptime_sec"], 2.0**32)
-        if heard.kind is TransferKind.REQUEST:
-            self._answer(heard)
-        elif heard.name == ALLOCATION and self.gives_out:
-            self._allocate(heard)
+        return one
 
     def stream_ended(self, stream: Hashable) -> None:
         pass
@@ -387,14 +410,43 @@ class UpfBench(RecordingBench[TransferPacket]):
             del self.changed[name]
         return True
 
-    def save_and_restart(self) -> Trial:
-        """What was set is kept, whether it saves by itself or not."""
-        save = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
-        yield from self.call(bus_requests.EXECUTE_OPCODE, save)
-        yield from self.call(
-            bus_requests.RESTART_NODE, {"magic_number": bus_requests.RESTART_MAGIC}, 1
+    def save(self) -> Any:
+        """The answer (its values) as its parameters are to be kept; None: not answered."""
+        values = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
+        return (yield from self.call(bus_requests.EXECUTE_OPCODE, values))
+
+    def restart(self) -> Any:
+        """Whether RestartNode is not refused; then it begins to start anew, if it does."""
+        node, starts, since = self.node, self.starts, len(self.every)
+        magic = {"magic_number": bus_requests.RESTART_MAGIC}
+        # It may be gone before it has answered.
+        answer = yield from self.call(bus_requests.RESTART_NODE, magic, 1)
+        if answer is not None and not answer["ok"]:
+            return False
+
+        def begins(one: TransferPacket) -> bool:
+            source = one.transfer.source
+            if one.kind == ALLOCATION:
+                return not source
+            if one.kind != self.device.status or source not in self._ids:
+                return False
+            return source != node or self.state_in(one) is ParachuteState.NOT_READY
+
+        # It may begin a moment after it has answered, and tell its old state until then.
+        begun = first_of(self.every, since, begins)
+        yield Wait(self.now + _STARTS_WITHIN, lambda: self.starts > starts or begun())
+        return True
+
+    def is_back(self, within: float) -> Any:
+        """Whether its start has ended within so many s. Its NodeStatus shows the start then."""
+        shows = first_of(
+            self.every,
+            len(self.every),
+            lambda one: one.kind == NODE_STATUS and one.transfer.source == self.node,
         )
-        return ""
+        is_up = yield from self.is_up(within)
+        yield Wait(self.now + LONGEST_STATUS, shows)
+        return is_up
 
     def comes_back(self, within: float) -> Any:
         """Whether it tells its state within so many s, under its new node id."""
@@ -411,9 +463,10 @@ class UpfBench(RecordingBench[TransferPacket]):
         """Whether it is under its own node id again, with the static node id that it had."""
         if not (yield from self.put_back(p.STATIC_NODE_ID)):
             return False
-        yield from self.save_and_restart()
+        yield from self.save()
+        yield from self.restart()
         self.node = self._home
-        return (yield from self.is_up(_AWAY))
+        return (yield from self.is_back(_AWAY))
 
     def state_in(self, status: TransferPacket) -> ParachuteState | None:
         """The state in its status; None: a number without a name, or the types do not tell it."""

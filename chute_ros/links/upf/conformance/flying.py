@@ -8,17 +8,20 @@ from functools import partial
 from chute_ros.conformance.bench import first_of
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
 from chute_ros.links.upf.conformance.bench import TransferPacket, UpfBench
-from chute_ros.links.upf.conformance.standard import UpfClause, clause
+from chute_ros.links.upf.conformance.standard import READY_WITHIN, UpfClause, clause
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.machine import DEPLOYED, REST_TIME
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.transfer import TransferKind
 
 _S = ParachuteState
 _MOVES = "it moves through its states, up to ARMED: its APS may fire if it is shaken or dropped"
 MAY_FIRE = "it must not, but it may FIRE"
 #: A state is told so soon after what moves it, s; it fires after so long at most.
 _TOLD_WITHIN, FIRES_WITHIN = 1.5, 4.0
+#: What is rejected and done all the same is seen within this, s.
+_MOVES_WITHIN = 0.5
 #: What moves it by itself on a bench does so within this, s.
 _WAITS = 3.0
 #: At rest for 5 s, and a while to tell.
@@ -58,9 +61,15 @@ def _excludes(type_name: str) -> UpfClause:
     def trial(bench: UpfBench) -> Trial:
         if (yield from bench.set(parameter, True)) is not True:
             raise failed(f"{parameter} cannot be switched on")
+        if (before := (yield from bench.state())) is _S.NOT_READY:
+            yield from bench.is_up(READY_WITHIN)
+            before = yield from bench.state()
         result = yield from bench.ask(type_name)
         if result != "REJECTED":
             raise failed(f"{parameter} is on, and the answer is {result or 'none'}")
+        yield from bench.watch_on(_MOVES_WITHIN)
+        if (after := (yield from bench.state())) is not before:
+            raise failed(f"{type_name} is REJECTED, and it went from {before} to {after}")
         return "REJECTED"
 
     return clause(
@@ -150,22 +159,24 @@ def _disabled(bench: UpfBench) -> Trial:
     yield from _by_hand(bench)
     if (yield from bench.set(p.ENABLE_PARACHUTE, False)) is not False:
         raise failed(f"{p.ENABLE_PARACHUTE} cannot be switched off")
-    since = len(bench.every)
-    result = yield from bench.ask("TYPE_DEPLOY_FORCE")
-    yield from bench.watch_on(FIRES_WITHIN)
-    fired = _launches(bench, since) or (yield from bench.state()) in DEPLOYED
+    results = []
+    for request in ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE"):
+        since = len(bench.every)
+        results.append((yield from bench.ask(request)) or "not answered")
+        yield from bench.watch_on(FIRES_WITHIN)
+        if _launches(bench, since) or (yield from bench.state()) in DEPLOYED:
+            yield from bench.set(p.ENABLE_PARACHUTE, True)
+            raise failed(f"{p.ENABLE_PARACHUTE} is off: IT FIRED by {request}")
     yield from bench.set(p.ENABLE_PARACHUTE, True)
-    if fired:
-        raise failed(f"{p.ENABLE_PARACHUTE} is off: IT FIRED by TYPE_DEPLOY_FORCE")
-    if result == "SUCCESS":
-        raise failed(f"{p.ENABLE_PARACHUTE} is off, and TYPE_DEPLOY_FORCE is a SUCCESS")
-    return result or "not answered"
+    if "SUCCESS" in results:
+        answers = " and ".join(results)
+        raise failed(f"{p.ENABLE_PARACHUTE} is off, and TYPE_DEPLOY* are answered with {answers}")
+    return " and ".join(results)
 
 
 def _launches(bench: UpfBench, since: int) -> list[float]:
     """When it told a trigger to fire, from this place on."""
-    kinds = (names.TRIGGER_LAUNCH, names.TRIGGER_SERVICE)
-    return [one.at for one in bench.every[since:] if one.kind in kinds]
+    return [one.at for one in bench.every[since:] if _orders_trigger(bench, one)]
 
 
 def _tells_launched(bench: UpfBench, one: TransferPacket) -> bool:
@@ -176,15 +187,18 @@ def _tells_launched(bench: UpfBench, one: TransferPacket) -> bool:
 
 
 def _deploy(bench: UpfBench) -> Trial:
-    """In the air and armed."""
+    """In the air and armed. Without its APS it is for TYPE_DEPLOY* alone to fire it."""
     yield from _by_hand(bench)
     yield from bench.set(p.ENABLE_PARACHUTE, True)
     yield from _reached(bench, "TYPE_TAKEOFF", "TYPE_ARM")
+    yield from bench.set(p.ENABLE_APS, False)
     began = bench.now
     bench.deployed_from = len(bench.every)
     result = yield from bench.ask("TYPE_DEPLOY")
     if result != "SUCCESS":
-        raise failed(f"ARMED, and TYPE_DEPLOY: {result or 'not answered'}")
+        bench.deployed_from = -1
+        answer = result or "not answered"
+        raise failed(f"it was ARMED, {p.ENABLE_APS} is off, and TYPE_DEPLOY: {answer}")
 
     out = first_of(bench.every, bench.deployed_from, partial(_tells_launched, bench))
     yield Wait(began + FIRES_WITHIN, out)
@@ -203,9 +217,44 @@ def _kill_first(bench: UpfBench) -> Trial:
         asks = one.kind == names.VEHICLE_SERVICE
         if asks and bench.definitions.type_name(one.kind, one.values) == "TYPE_KILLSWITCH":
             return "asked before"
-        if _tells_launched(bench, one) or one.kind == names.TRIGGER_LAUNCH:
+        if _tells_launched(bench, one) or _orders_trigger(bench, one):
             raise failed("it fired before it asked for TYPE_KILLSWITCH", [one.packet])
     raise failed("it never asked for TYPE_KILLSWITCH")
+
+
+def _orders_trigger(bench: UpfBench, one: TransferPacket) -> bool:
+    """Of the controller, that a trigger is to fire."""
+    if one.transfer.source != bench.node or one.transfer.kind is TransferKind.RESPONSE:
+        return False
+    if one.kind != names.TRIGGER_SERVICE:
+        return one.kind == names.TRIGGER_LAUNCH
+    return bench.definitions.type_name(one.kind, one.values) == "TYPE_LAUNCH"
+
+
+def _launched_after(bench: UpfBench) -> Trial:
+    """Only a trigger that is heard shows what it has reported, and when."""
+    yield from ()
+    if bench.deployed_from < 0:
+        raise not_tried("it was not deployed")
+    if not any(one.kind == names.TRIGGER_STATUS for one in bench.every):
+        raise not_tried("no TriggerStatus is received")
+    for one in bench.every[bench.deployed_from :]:
+        bench.look_at([one])
+        if _tells_launched(bench, one):
+            raise failed("it is LAUNCHED before its trigger has reported anything", [one.packet])
+        if _trigger_reports(bench, one):
+            break
+    return "its trigger reported first"
+
+
+def _trigger_reports(bench: UpfBench, one: TransferPacket) -> bool:
+    """Of a trigger, that it has fired: in its status, or in its answer."""
+    if one.kind == names.TRIGGER_STATUS:
+        state = bench.definitions.state_name(one.kind, one.values)
+        return bool(one.values.get("is_launched")) or state == "LAUNCHED"
+    if one.kind != names.TRIGGER_SERVICE or one.transfer.kind is not TransferKind.RESPONSE:
+        return False
+    return bench.definitions.result_name(one.kind, one.values) == "SUCCESS"
 
 
 def _touchdown(bench: UpfBench) -> Trial:
@@ -248,17 +297,32 @@ CLAUSES: tuple[UpfClause, ...] = (
     clause(
         _PARAMETERS,
         "disabled",
-        "with Enable Parachute off nothing deploys, not even TYPE_DEPLOY_FORCE",
+        "with Enable Parachute off nothing deploys, neither TYPE_DEPLOY nor TYPE_DEPLOY_FORCE",
         _disabled,
         MAY_FIRE,
         Risk.FIRES,
     ),
-    clause(_STATES, "deploy", "TYPE_DEPLOY: LAUNCHED", _deploy, "IT FIRES", Risk.FIRES),
+    clause(
+        _STATES,
+        "deploy",
+        "TYPE_DEPLOY: LAUNCHED, also with Enable APS off",
+        _deploy,
+        "IT FIRES",
+        Risk.FIRES,
+    ),
     clause(
         _STATES,
         "kill-first",
         "before it fires it asks the vehicle for TYPE_KILLSWITCH",
         _kill_first,
+        "it has fired",
+        Risk.FIRES,
+    ),
+    clause(
+        _STATES,
+        "launched-after-trigger",
+        "it is LAUNCHED once its trigger has reported that it has fired",
+        _launched_after,
         "it has fired",
         Risk.FIRES,
     ),

@@ -188,10 +188,17 @@ def _launch(bench: UpfBench) -> Trial:
 
 def _is_launched(bench: UpfBench) -> Trial:
     """Not the other way: it has fired, whatever its state is."""
-    yield from ()
-    told = bench.look_at(one for one in _statuses(bench, 0) if _fired(bench, one))
+    told = [one for one in _statuses(bench, 0) if _fired(bench, one)]
     if not told:
         raise not_tried("it was not seen to fire")
+    since = len(bench.heard)
+    yield from bench.watch_on(STATUS_WITHIN)
+    if (yield from bench.wait_for(names.TRIGGER_STATUS, STATUS_WITHIN)) is None:
+        raise failed(f"it has fired, and no TriggerStatus comes for {STATUS_WITHIN:g} s")
+    later = _statuses(bench, since)
+    if forgot := [one.packet for one in later if not _fired(bench, one)]:
+        raise failed("it reported that it has fired, and then that it has not", forgot[:1])
+    bench.look_at([*told, *later])
     if "is_launched" not in told[0].values:
         raise not_tried("the data types have no is_launched")
     if wrong := [one.packet for one in told if not one.values["is_launched"]]:
@@ -282,7 +289,7 @@ CLAUSES: tuple[UpfClause, ...] = (
     _may_fire(
         _TYPES,
         "trigger-is-launched",
-        "in the state LAUNCHED is_launched is true",
+        "what has fired goes on to report so; in the state LAUNCHED is_launched is true",
         _is_launched,
         "it has fired",
     ),

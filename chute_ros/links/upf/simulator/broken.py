@@ -34,6 +34,8 @@ _PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
 _MOVES_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
 #: It is silent for so long after it was first told the time, and after spoilt frames, s.
 _STANDS_STILL, _STUNNED = 6.4, 2.3
+#: It is LAUNCHED, and fires so long after that, s.
+_FIRES_AFTER = 0.3
 #: Its TriggerStatus comes so seldom, for so long after its first start, s.
 _SELDOM, _SELDOM_FOR = 4.0, 9.0
 #: With what the names of the clauses of a trigger begin.
@@ -156,15 +158,22 @@ class BrokenController(BrokenNode, UpfController):
         if name == "TYPE_ARM" and self.breaks == "arm-order" and by_hand:
             self._enter(_S.ARMED)
             return "SUCCESS"
-        if name == "TYPE_DEPLOY" and self.breaks == "deploy":
-            return "SUCCESS"
         disabled = not self.switch(p.ENABLE_PARACHUTE)
+        if name == "TYPE_DEPLOY" and self.breaks == "deploy" and not disabled:
+            return "SUCCESS"
         if name == "TYPE_DEPLOY_FORCE" and self.breaks == "disabled" and disabled:
             self._fire(self.now)
             return "SUCCESS"
         result = super().decide(name)
         turned = result == "SUCCESS" and self.breaks == _ANSWERS.get(name)
         return "FAILED" if turned else result
+
+    def _fire(self, now: float) -> None:
+        if self.breaks == "launched-after-trigger" and self.state is not _S.LAUNCHED:
+            self._enter(_S.LAUNCHED)
+            self._launch_at = now + _FIRES_AFTER
+            return
+        super()._fire(now)
 
     def _move(self, event: ControllerEvent) -> None:
         if event is not ControllerEvent.AT_REST or self.breaks != "touchdown":
@@ -417,6 +426,7 @@ BREAKS = (
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
     *("unknown-type", *_BY_ITSELF, "arm-order", "disabled", "deploy", "touchdown"),
+    "launched-after-trigger",
     *(f"{_TRIGGER}{name}" for name in (*_NODE_CHANGES, *_NODE_BREAKS, "node-id")),
     *_TRIGGER_CHANGES,
 )
