@@ -280,9 +280,9 @@ def _run_link(
 
 
 def main_of(make: Any) -> None:
-    """Run make() and turn a user's mistake into one line and exit code 2. Until its wires are taken
-    a Ctrl-C ends it at once: as an exception it is lost in a library that passes over it, and the
-    simulator would go on."""
+    """Run make() and turn a user's mistake into one line and exit code 2. Until its wires are
+    taken a Ctrl-C ends it at once: as an exception it is lost in a library that passes over it,
+    and the simulator would go on."""
     try:
         with at_ctrl_c(signal.SIG_DFL):
             make()
