@@ -69,7 +69,7 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     ordered = state.stage in (Stage.DEPLOYED, Stage.FAULT) and state.flight.airborne
     if not in_flight and not ordered:
         return f"the vehicle is {state.stage.name}, not in flight"
-    if state.stage is Stage.KILLING and _killed_alone(state):
+    if _killed_alone(state):
         return _ALONE
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
@@ -124,6 +124,10 @@ def _killed_alone(state: State) -> bool:
     """A person asked for the kill under way alone. One that came to nothing has stopped no motors,
     and what falls later does not fall by it; what fell before falls on as they wanted."""
     kill = state.killing.kill
+    # A parachute that came out by itself since then asks for no other one.
+    out = state.stage is Stage.DEPLOYED and state.killing.killed_in_flight
+    if state.stage is not Stage.KILLING and not out:
+        return False
     in_vain = kill is not None and kill.given_up and not kill.confirmed
     falls_on = any(rule.denied == _ALONE for rule in state.rules.values())
     return state.killing.kill_only and (falls_on or not in_vain)

@@ -94,7 +94,7 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     why = known.doubt(name, now)
     if why or part is None or state.measured(part).source != known.source:
         return why
-    why = doubt(state, part, state.measured(part).value, now)
+    why = state.measured(part).doubt(part, now)
     return f"{part}: {why}" if why else ""
 
 

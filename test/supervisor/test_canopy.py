@@ -70,6 +70,25 @@ def test_without_another_it_is_an_alarm_that_does_not_stop() -> None:
     assert len(story.alarms()) == before
 
 
+def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other() -> None:
+    story = Story(shipped("multirotor", deploy_ladder=TWO)).ready()
+    story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
+    story.fly(2.0, height=300.0)
+    story.at(2.0, i.KillRequest(1, "operator", "nobody below", kill_only=True))
+    story.at(2.05, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(2.1, parachute(device="1/161", deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    for k in range(120):
+        told = {"vertical_speed": -min(0.5 * k, 22.0), "height": 300.0 - 0.05 * k * 20.0}
+        story.fly(story.t + 0.05, **told)
+    assert story.fired() == ["KILL"]
+    assert "denied, a person asked for the kill alone; safety/deploy releases" in story.said()
+    # Until that person wants it.
+    story.at(story.t, i.DeployRequest(2, True, "the other one"))
+    story.fly(story.t + 0.6, vertical_speed=-22.0, height=150.0)
+    assert story.fired()[-1] == "DEPLOY"
+
+
 @pytest.mark.parametrize(("speed", "alarmed"), [(16.0, True), (12.0, True), (6.0, False)])
 def test_one_whose_estimator_hovers_under_it_is_an_alarm_by_the_barometer(
     speed: float, alarmed: bool
