@@ -66,6 +66,10 @@ _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
 #: One that lies on its side sinks by its barometer's last second with this at least, m/s: half a
 #: second of free fall, and what gusts of an ordinary flight do not reach.
 _LIES_AND_SINKS = 2.5
+#: One that feels its weight to this, m/s^2, is upright while its barometer tells no faster sink
+#: than one comes down by hand with, m/s (PILOT_SPEED_DN of ArduPilot, at most 5): what lies on its
+#: side and falls soon feels its drag besides.
+_ITS_WEIGHT, _BY_HAND = 0.7, 5.0
 #: An estimator that tells more than this share of a fall that is felt does not hide it.
 _TOLD_AS_WELL = 0.5
 #: Of so many moments a mean can be told; cosine of 70 degrees: no wing carries what leans more.
@@ -320,7 +324,8 @@ def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     if not known:
         return _carried_leaning(motion)
     force = fmean([one[2] for one in known])
-    if barometer.rate >= -_LIES_AND_SINKS:
+    by_hand = abs(force - GRAVITY) <= _ITS_WEIGHT and barometer.rate >= -_BY_HAND
+    if by_hand or barometer.rate >= -_LIES_AND_SINKS:
         told = f"the barometer reports {barometer.rate:+.1f} m/s"
         return f"a force of {force:.1f} m/s^2 carries it, and {told}"
     if known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:

@@ -334,6 +334,29 @@ def test_one_that_climbs_and_falls_while_nothing_is_heard_of_it_is_released(prof
     assert story.t < back_at + 1.5
 
 
+@AIRCRAFT
+@pytest.mark.parametrize("rate", [12.0, 25.0, 50.0])
+@pytest.mark.parametrize("sink", [1.5, 3.0, 4.5])
+def test_an_estimator_that_leans_over_in_a_descent_by_hand_ends_no_flight(
+    profile: str, rate: float, sink: float
+) -> None:
+    """Given one that sinks as what leans so would, above what its barometer and its force tell."""
+    teller, true, speed = told_to(profile), 60.0, -sink
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(2.0, true, true_height=true)
+    for k in range(30):
+        now = -sink * min(1.0, k / 10.0)
+        true += EVERY * now
+        teller.tell(height=true, vertical_speed=now, tilt=5.0, force=9.8, true_height=true)
+    height = true
+    for k in range(80):
+        lean = min(95.0, 5.0 + rate * EVERY * k)
+        speed -= EVERY * GRAVITY * (1.0 - math.cos(math.radians(lean)))
+        height, true = height + EVERY * speed, true - EVERY * sink
+        teller.tell(height=height, vertical_speed=speed, tilt=lean, force=9.8, true_height=true)
+    assert teller.story.fired() == []
+
+
 def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer() -> None:
     """Given a tumble whose height and speed are told as in a hover, with noise."""
     teller = told_to("multirotor")

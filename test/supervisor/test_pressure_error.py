@@ -68,3 +68,26 @@ def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(
     """Given a quadplane whose lift stops; nobody tells what was commanded."""
     took = fall(up(profile), fastest, tilt=10.0)
     assert falling_flat(took, fastest)[0] < 2.2 * fastest
+
+
+@ERRORS
+@pytest.mark.parametrize("fastest", [12.0, 18.0, 25.0])
+def test_what_lies_on_its_side_with_the_thrust_of_a_hover_is_deployed(
+    error: float, fastest: float
+) -> None:
+    """Given motors that push on with its weight, and an airspeed to the side as downwards."""
+    teller, height, tilt = up("multirotor"), HIGH, 4.0
+    aside = down = 0.0
+    while not deployed(teller) and height > HIGH - 60.0:
+        tilt = min(tilt + 15.0, 85.0)
+        airspeed, leans = math.hypot(aside, down), math.radians(tilt)
+        drag = GRAVITY * airspeed / fastest**2
+        push = GRAVITY * math.sin(leans) - drag * aside
+        lift = GRAVITY * math.cos(leans) - drag * down
+        aside, down = aside + EVERY * push, down + EVERY * (lift - GRAVITY)
+        height += EVERY * down
+        told = {"height": height, "vertical_speed": down + teller.noise(0.2), "tilt": tilt}
+        truth = height - too_low(error, airspeed)
+        teller.tell(**told, force=math.hypot(push, lift), true_height=truth)
+    assert deployed(teller)
+    assert HIGH - height < (30.0 if error < -0.2 else 10.0)
