@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.udp import UdpWire
 
@@ -46,19 +46,28 @@ class Pilot:
 
     def accepted(self, command: int) -> bool:
         """The autopilot has accepted this MAV_CMD since it was last sent."""
+        self._read()
+        return bool(self.results.get(command) == dialect.MAV_RESULT_ACCEPTED)
+
+    def _read(self) -> None:
         now = time.monotonic()
         for file in self._wire.files():
-            for data, _ in self._wire.read(file):
-                for frame in self._decoder.feed_datagram(data, now):
-                    if frame.message.get_type() == "COMMAND_ACK":
-                        self.results[frame.message.command] = frame.message.result
-        return bool(self.results.get(command) == dialect.MAV_RESULT_ACCEPTED)
+            while datagrams := self._wire.read(file):
+                for data, _ in datagrams:
+                    self._hear(self._decoder.feed_datagram(data, now))
+
+    def _hear(self, frames: list[Frame]) -> None:
+        for frame in frames:
+            if frame.message.get_type() == "COMMAND_ACK":
+                self.results[frame.message.command] = frame.message.result
 
     def close(self) -> None:
         """Close the socket."""
         self._wire.close()
 
     def _command(self, number: int, *params: float) -> None:
+        # Telemetry that nobody reads between two orders leaves no room for the answer.
+        self._read()
         self.results.pop(number, None)
         values = [*params, *[0.0] * (7 - len(params))]
         message = dialect.MAVLink_command_long_message(self._system_id, 1, number, 0, *values)
