@@ -77,6 +77,15 @@ class CtrlC:
             raise self._error()
 
 
+def once_more() -> None:
+    """A Ctrl-C that came and did not end what it should is raised again: Python drops what is
+    raised while an object is being deleted. For loops that run for hours."""
+    handler = signal.getsignal(signal.SIGINT)
+    if isinstance(handler, CtrlC):
+        with handler.held():
+            pass
+
+
 @contextmanager
 def in_one_piece() -> Iterator[None]:
     """What ends this process comes afterwards, if a CtrlC takes it: raised where rclpy makes one

@@ -29,6 +29,7 @@ from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tapes import TapeFile, Tapes
 from chute_ros.errors import CampaignError, ChuteError, RecordError
+from chute_ros.interrupts import once_more
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
@@ -328,6 +329,7 @@ class _CampaignProgress:
 
     def look(self, tally: campaign.Tally) -> None:
         """One more flight has been flown."""
+        once_more()
         for line in tally.wrong[self._wrong :]:
             self._wrong += 1
             if self._wrong <= _MOST_TOLD:

@@ -319,6 +319,26 @@ def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
     assert f"`make campaign FLIGHTS={flown} SEED=0`" in page.read_text()
 
 
+def test_a_ctrl_c_that_a_destructor_drops_ends_it_with_the_next_flight(tmp_path):
+    drops = """
+import signal
+class Dropping:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+look = command._CampaignProgress.look
+def dropped(self, tally):
+    look(self, tally)
+    if tally.flights == 2:
+        Dropping()
+command._CampaignProgress.look = dropped
+"""
+    with flying("campaign", "--jobs", "1", "--failures", str(tmp_path), changed=drops) as process:
+        out, err = process.communicate(timeout=120.0)
+    assert process.returncode == 130, err
+    assert err.splitlines()[-1] == "campaign: interrupted"
+    assert flown_by(out) in (2, 3)
+
+
 def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     """As the system does that has no memory left."""
     kept = tmp_path / "kept.json"
