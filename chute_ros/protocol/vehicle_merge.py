@@ -148,6 +148,8 @@ class VehicleMerge:
         self._vote = SpeedVote()
         #: (Part, two sources) -> since when they differ.
         self._differ: dict[tuple[str, frozenset[str]], _Difference] = {}
+        #: Who told a height as the autopilot was seen to have started anew: it has not.
+        self._heights_outlive: set[str] = set()
 
     def recall(self, link_state: LinkState, now: float) -> None:
         """How the autopilot was heard before a restart: one that was, and is silent from now
@@ -167,6 +169,9 @@ class VehicleMerge:
 
     def hear_state(self, state: VehicleState, now: float) -> None:
         """A message on vehicle/state came now; its parts are as old as it says."""
+        if state.reboot_count > self._vehicle.reboot_count:
+            known = {one for one, words in self._words.items() if "height" in words}
+            self._heights_outlive = known.difference(AUTOPILOTS)
         self._vehicle = state
         self._rates_of(VEHICLE_STATE, now)
         for part, values in readings.vehicle_state(state).items():
@@ -201,9 +206,8 @@ class VehicleMerge:
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,
-            # The height of another source has not started anew.
             height_holds=self._vehicle.height_holds
-            or self._source("height", now) not in (None, *AUTOPILOTS),
+            or self._source("height", now) in self._heights_outlive,
             faults=self._faults(now),
             **fields,
         )

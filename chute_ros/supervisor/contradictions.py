@@ -67,9 +67,10 @@ _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
 #: second of free fall, and what gusts of an ordinary flight do not reach.
 _LIES_AND_SINKS = 2.5
 #: One that feels its weight to this, m/s^2, is upright while its barometer tells no faster sink
-#: than one comes down by hand with, m/s (PILOT_SPEED_DN of ArduPilot, at most 5): what lies on its
-#: side and falls soon feels its drag besides.
-_ITS_WEIGHT, _BY_HAND = 0.7, 5.0
+#: than before it was said to lean, nor than one comes down by hand with, m/s (PILOT_SPEED_DN of
+#: ArduPilot, at most 5): what lies on its side and falls soon feels its drag besides. Not so where
+#: the cosine of its tilt changes by more than this meanwhile: no estimator leans over so fast.
+_ITS_WEIGHT, _BY_HAND, _TUMBLES = 0.7, 5.0, 0.6
 #: An estimator that tells more than this share of a fall that is felt does not hide it.
 _TOLD_AS_WELL = 0.5
 #: Of so many moments a mean can be told; cosine of 70 degrees: no wing carries what leans more.
@@ -324,7 +325,14 @@ def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     if not known:
         return _carried_leaning(motion)
     force = fmean([one[2] for one in known])
-    by_hand = abs(force - GRAVITY) <= _ITS_WEIGHT and barometer.rate >= -_BY_HAND
+    upright = [one[1] for one in motion if one[3] >= _LEANS and not math.isnan(one[1])]
+    fastest = max(min(upright, default=-_BY_HAND) - _LIES_AND_SINKS, -_BY_HAND)
+    cosines = [one[3] for one in known]
+    by_hand = (
+        barometer.rate >= fastest
+        and abs(force - GRAVITY) <= _ITS_WEIGHT
+        and max(cosines) - min(cosines) <= _TUMBLES
+    )
     if by_hand or barometer.rate >= -_LIES_AND_SINKS:
         told = f"the barometer reports {barometer.rate:+.1f} m/s"
         return f"a force of {force:.1f} m/s^2 carries it, and {told}"

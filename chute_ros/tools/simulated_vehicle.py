@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -69,13 +70,12 @@ def new_home() -> Path:
     """ROS_HOME of one run, for what its nodes keep. Of its own: a vehicle of a run before may be
     without its parachute, and a real one may have the same namespace. ParameterError: it cannot be
     made."""
-    began = time.strftime("%Y%m%d_%H%M%S")
-    folder = ros_home() / "simulations" / f"{began}_{os.getpid()}"
+    runs = ros_home() / "simulations"
     try:
-        make_folder(folder)
+        make_folder(runs)
+        return Path(tempfile.mkdtemp(prefix=time.strftime("%Y%m%d_%H%M%S_"), dir=runs))
     except OSError as error:
-        raise ParameterError(f"{folder}: {error.strerror or error}: set ROS_HOME") from None
-    return folder
+        raise ParameterError(f"{runs}: {error.strerror or error}: set ROS_HOME") from None
 
 
 def own_folder(path: Path) -> Path:

@@ -61,6 +61,14 @@ def test_a_restart_of_the_autopilot_is_none_of_a_height_that_another_tells(sourc
     assert (state.rebooted_in_flight, state.height_holds) == (True, holds)
 
 
+def test_a_height_that_is_heard_after_the_restart_alone_may_have_begun_with_it():
+    one = merge("odometry", "vehicle/state")
+    one.hear_state(VehicleState(height=30.0, height_age=0.0), 10.0)
+    one.hear_state(VehicleState(reboot_count=1, rebooted_in_flight=True), 10.1)
+    one.hear("odometry", {"height": (0.0,)}, 10.2)
+    assert not one.state(10.2).height_holds
+
+
 def told_at(one, *rates, until=20.0):
     """The faults at the end, of an IMU whose parts come at these rates (Hz) from 10 s on, beside
     an autopilot at 10 Hz."""

@@ -89,6 +89,25 @@ def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other(
     assert story.fired()[-1] == "DEPLOY"
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_one_that_was_ordered_after_a_kill_alone_is_followed_as_any_other(late: bool) -> None:
+    """Given a person who wants the kill alone, and then the deploy, which may be given up."""
+    story = Story(shipped("multirotor", deploy_ladder=TWO)).ready()
+    story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
+    story.fly(2.0, height=300.0)
+    story.at(2.0, i.KillRequest(1, "operator", "nobody below", kill_only=True))
+    story.at(2.05, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(2.5, i.DeployRequest(2, False, "somebody below"))
+    assert story.fired() == ["KILL", "DEPLOY"]
+    if late:
+        story.at(2.6, story.report(Action.DEPLOY, Outcome.FAILED))
+    story.at(2.7, parachute(device="1/161", deployed=True))
+    for k in range(120):
+        told = {"vertical_speed": -min(0.5 * k, 22.0), "height": 300.0 - 0.05 * k * 20.0}
+        story.fly(story.t + 0.05, **told)
+    assert story.newest(Action.DEPLOY).device == "1/162"
+
+
 @pytest.mark.parametrize(("speed", "alarmed"), [(16.0, True), (12.0, True), (6.0, False)])
 def test_one_whose_estimator_hovers_under_it_is_an_alarm_by_the_barometer(
     speed: float, alarmed: bool

@@ -334,5 +334,5 @@ def test_so_is_a_domain_that_is_none(arguments):
 def test_where_nothing_can_be_kept_nothing_starts():
     code, out, err = run("--no-panel", ROS_HOME="/proc/nowhere")
     assert (code, out) == (2, "")
-    assert err.startswith("sim: /proc/nowhere/chute_ros/simulations/")
+    assert err.startswith("sim: /proc/nowhere/chute_ros/simulations: ")
     assert err.endswith(": set ROS_HOME\n")

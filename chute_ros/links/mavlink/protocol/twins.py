@@ -69,8 +69,9 @@ class Twins:
         """Two clocks came by turns just now: a restart may only seem to be one. What comes out of
         order is no other clock until a restart could look like it."""
         offsets = [one.offset for one in self._sights if now - one.at <= _GONE]
-        turns = [abs(a - b) * 1000.0 > REBOOT_JUMP_MS for a, b in itertools.pairwise(offsets)]
-        return sum(turns) > 1
+        least = min(offsets, default=0.0)
+        back = [(one - least) * 1000.0 > REBOOT_JUMP_MS for one in offsets]
+        return sum(a is not b for a, b in itertools.pairwise(back)) > 1
 
     def doubt(self, who: str, now: float) -> str:
         """That who, two of them, are there, and what to do about it; empty: they are not."""
@@ -135,6 +136,11 @@ class Twins:
         second = list(itertools.compress(sights, (not one for one in is_first)))
         if min(len(first), len(second)) < _EACH:
             return
+        newer, older = (first, second) if pair[0] < pair[1] else (second, first)
+        # Two send at the same time: what the older one says is behind. Where a way was slow for a
+        # while, hardly any of it is.
+        if sum(one.behind for one in older) < len(older) / 2:
+            return
         # A clock that a restart has ended came before the other one, and comes no more.
         together = min(first[-1].at, second[-1].at) - max(first[0].at, second[0].at)
         turns = sum(a is not b for a, b in itertools.pairwise(is_first))
@@ -145,9 +151,8 @@ class Twins:
         if max(spreads) > _IN_STEP or apart < max(_CLOSEST, sum(spreads)):
             return
         if apart < _LATEST:
-            fewer, more = sorted((len(first), len(second)))
             copies = sum(now - at <= WINDOW for at in self._copies)
-            if fewer < _SHARE * more or copies > _COPIES * fewer:
+            if len(older) < _SHARE * len(newer) or copies > _COPIES * len(older):
                 return
         self._found_at = now
         self._ours, self._other = sorted(pair, key=lambda one: abs(one - self._ours))

@@ -7,6 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chute_ros.links.mavlink.protocol.twins import OVER_AFTER, Twins
+from chute_ros.protocol.boot_clock import Age, BootClock
 
 KINDS = ("ATTITUDE", "GLOBAL_POSITION_INT", "SCALED_IMU")
 
@@ -115,3 +116,24 @@ def test_a_restart_is_none_of_two_clocks_however_much_comes_out_of_order(seed):
         by_turns += [at] if twins.by_turns(at) else []
     # Then only what was still under way as it started anew could be another's.
     assert all(10.5 <= at <= 14.0 for at in by_turns)
+
+
+@pytest.mark.parametrize("slower", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("rate", [4.0, 20.0])
+def test_a_way_that_is_slow_for_a_while_is_no_second_device(slower, rate):
+    """Given two routes to one device: from t+10 to t+16 all comes by the slower one."""
+    messages = [
+        (at + slower * (10.0 <= at < 16.0), *rest) for at, *rest in said(-50.0, 0, 40, rate)
+    ]
+    assert run(sorted(messages))[0] == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_messages_that_are_held_back_for_more_than_a_second_are_no_restart(seed):
+    chance, twins, clock = random.Random(seed), Twins(), BootClock()
+    restarts = []
+    for at, kind, boot in received(said(-50.0, 0.0, 40.0), lambda: chance.uniform(0.0, 1.3)):
+        twins.observe(kind, boot, at)
+        anew = clock.observe(boot) is Age.RESTARTED
+        restarts += [at] if anew and not twins.by_turns(at) else []
+    assert restarts == []
