@@ -123,10 +123,10 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
 def _killed_alone(state: State) -> bool:
     """A person asked for the kill under way alone. One that came to nothing has stopped no motors,
     and what falls later does not fall by it; what fell before falls on as they wanted."""
-    kill = state.killing.kill
+    kill, deployed = state.killing.kill, state.stage is Stage.DEPLOYED
     # A parachute that came out by itself since then asks for no other one.
-    out = state.stage is Stage.DEPLOYED and state.killing.killed_in_flight
-    if state.stage is not Stage.KILLING and not out:
+    by_itself = deployed and state.killing.killed_in_flight and not state.deploying.deploys
+    if state.stage is not Stage.KILLING and not by_itself:
         return False
     in_vain = kill is not None and kill.given_up and not kill.confirmed
     falls_on = any(rule.denied == _ALONE for rule in state.rules.values())

@@ -57,8 +57,6 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         alarm_at = turn.now + turn.config.alarm_interval
         turn.alarming = replace(turn.alarming, canopy_fails=True, alarm_at=alarm_at)
         return
-    # Who wanted the kill alone wants more now, or what came of it is over.
-    turn.killing = replace(turn.killing, kill_only=False)
     if turn.state.stage in ON_GROUND or again:
         note_released(turn)
     end_kill(turn)

@@ -89,6 +89,18 @@ def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other(
     assert story.fired()[-1] == "DEPLOY"
 
 
+def test_a_kill_alone_under_a_canopy_keeps_back_no_other() -> None:
+    """Given a person who stops the motors once a rule has deployed."""
+    story = under_canopy(22.0, 2.5, *TWO)
+    height = story.state.measured("height").value
+    story.at(story.t, i.KillRequest(1, "operator", "the motors run", kill_only=True))
+    story.at(story.t, story.report(Action.KILL, Outcome.CONFIRMED))
+    for k in range(100):
+        told = {"height": height - 1.1 * k, "tilt": 20.0 + k % 3}
+        story.fly(story.t + 0.05, vertical_speed=-22.0, **told)
+    assert story.newest(Action.DEPLOY).device == "1/162"
+
+
 @pytest.mark.parametrize("late", [False, True])
 def test_one_that_was_ordered_after_a_kill_alone_is_followed_as_any_other(late: bool) -> None:
     """Given a person who wants the kill alone, and then the deploy, which may be given up."""
