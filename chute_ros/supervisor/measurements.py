@@ -76,9 +76,6 @@ DERIVED: dict[str, tuple[str, ...]] = {
     SPEED_ERROR: (PRESSURE_ALTITUDE, VERTICAL_SPEED),
     FORCE_ERROR: (ACCELERATION, VERTICAL_SPEED, TILT),
 }
-#: Measurement -> the other one of which its source has made it: in doubt where that jumps. Not so
-#: a sink beyond the target, where the rules ask the heights as well.
-MADE_OF = {"attitude_error": TILT}
 
 
 #: The unit of each, for people.

@@ -26,7 +26,6 @@ from chute_ros.supervisor.measurements import (
     FELT_FALL,
     FORCE_ERROR,
     HEIGHT,
-    MADE_OF,
     PRESSURE_ALTITUDE,
     SPEED_ERROR,
     VERTICAL_ACCELERATION,
@@ -90,12 +89,7 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
         return ""
     if PARTS.get(name, name) in state.heard.disputed:
         return "another source reported otherwise"
-    known, part = state.measured(name), MADE_OF.get(name)
-    why = known.doubt(name, now)
-    if why or part is None or state.measured(part).source != known.source:
-        return why
-    why = state.measured(part).doubt(part, now)
-    return f"{part}: {why}" if why else ""
+    return state.measured(name).doubt(name, now)
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:

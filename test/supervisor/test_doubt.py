@@ -107,20 +107,6 @@ def test_what_another_source_contradicts_is_doubted() -> None:
     assert story.fired()[0] == "KILL"
 
 
-@pytest.mark.parametrize(
-    ("profile", "sinks"), [("fixed_wing", -8.0), ("multirotor", -4.0)], ids=str
-)
-def test_what_is_made_of_one_in_doubt_is_in_doubt(profile: str, sinks: float) -> None:
-    """Given noise for an attitude, and so for how far it is from the commanded one, in a throw."""
-    story = Story(shipped(profile)).ready().fly(0.3, attitude_error=2.0)
-    for k in range(40):
-        wrong = {"tilt": 170.0 if k % 3 else 10.0, "attitude_error": 165.0 if k % 3 else 5.0}
-        light = {"vertical_speed": sinks - 0.1 * k, "acceleration": 0.6 + 0.01 * (k % 5)}
-        story.fly(story.t + 0.02, 0.02, **wrong, **light)
-    assert "tilt_deg: another was not taken" in doubt(story, "attitude_error")
-    assert story.fired() == []
-
-
 # -- a sink needs the heights, where they are told ------------------------------------------------
 
 

@@ -18,7 +18,6 @@ from chute_ros.supervisor.measurements import (
     DERIVED,
     FELT_DROP,
     FELT_FALL,
-    MADE_OF,
     STANDARD_LIMITS,
     TILT,
     VERTICAL_ACCELERATION,
@@ -108,11 +107,6 @@ class MeasurementCondition(Condition):
     @cached_property
     def _known_by(self) -> tuple[str, ...]:
         return known_by(self.measurement)
-
-    @cached_property
-    def _doubted_by(self) -> tuple[str, ...]:
-        made_of = MADE_OF.get(self.measurement)
-        return (*self.measured, made_of) if made_of else self.measured
 
     @property
     def is_silence(self) -> bool:
@@ -236,7 +230,7 @@ class MeasurementCondition(Condition):
     ) -> Iterable[float]:
         """When it is too old to hold, and, where that lets it hold, known or doubted no more."""
         limits = config.profile.limits
-        turning = self._known_by if self.if_unknown else self._doubted_by if doubts else ()
+        turning = self._known_by if self.if_unknown else self.measured if doubts else ()
         if not (turning or holds):
             return ()  # most are so, each time that the supervisor asks when to wake
         told = [state.measured(name).turns_at(limits[name], now) + JUST_AFTER for name in turning]
