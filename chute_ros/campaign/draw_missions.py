@@ -6,7 +6,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from chute_ros.campaign.draw_world import with_one_wrong, wrong_sensor
+from chute_ros.campaign.draw_world import perhaps_one_wrong
 from chute_ros.campaign.manoeuvre import Manoeuvre, landing
 from chute_ros.campaign.scenario import MOST_FAULTS, Failure, Scenario, Stop
 
@@ -14,7 +14,6 @@ from chute_ros.campaign.scenario import MOST_FAULTS, Failure, Scenario, Stop
 #: those in which nothing fails and nothing else is flown.
 _DECKS, _SECOND_FLIGHTS = 0.05, 0.03
 _DECKS_OF_STANDING, _RESTARTS_AGAIN, _LANDINGS, _TRANSITIONS = 0.4, 0.3, 0.4, 0.4
-_WRONG_SENSOR = 0.5
 
 
 def on_a_mission(drawn: Scenario) -> Scenario:
@@ -28,7 +27,7 @@ def on_a_mission(drawn: Scenario) -> Scenario:
     if drawn.failure is Failure.REBOOT and chance.random() < _RESTARTS_AGAIN:
         return _restarting(chance, drawn)
     flies = drawn.failure is Failure.NOTHING and not drawn.stands and drawn.manoeuvre is None
-    if not flies or drawn.tape is not None:
+    if not flies:
         return drawn
     if drawn.profile == "fixed_wing" and chance.random() < _TRANSITIONS:
         return _flying(chance, drawn, _transition(chance))
@@ -65,6 +64,4 @@ def _landing(chance: random.Random, above: float) -> Manoeuvre:
 def _flying(chance: random.Random, drawn: Scenario, flown: Manoeuvre) -> Scenario:
     """With one sensor wrong in it, or none; and nobody acts as if something had failed."""
     drawn = replace(drawn, manoeuvre=flown, person=None, aps=False)
-    if chance.random() >= _WRONG_SENSOR:
-        return drawn
-    return with_one_wrong(drawn, wrong_sensor(chance, drawn, flown.begin, flown.over_by))
+    return perhaps_one_wrong(chance, drawn, flown.begin, flown.over_by)

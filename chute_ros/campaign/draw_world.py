@@ -80,7 +80,7 @@ def _on_the_ground(chance: random.Random, drawn: Scenario) -> Scenario:
     end = round(begin + lasts, 3)
     fault = EstimatorFault(how, round(begin, 3), end, round(strength, 2))
     stands = replace(drawn, height=0.0, gusts=0.0, person=None, aps=False)
-    return with_one_wrong(stands, fault)
+    return _with_one_wrong(stands, fault)
 
 
 def _autopilot(chance: random.Random, profile: str) -> Autopilot:
@@ -158,7 +158,7 @@ def _with_estimator(chance: random.Random, drawn: Scenario) -> Scenario:
     lasts = chance.uniform(2.0, 7.0)
     strength = 0.0 if how == "hovers" else round(strength, 2)
     fault = EstimatorFault(how, begin, round(begin + lasts, 3), strength)
-    return with_one_wrong(drawn, fault)
+    return _with_one_wrong(drawn, fault)
 
 
 def _manoeuvres(failure: Failure) -> float:
@@ -190,23 +190,24 @@ def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:
     drawn = replace(drawn, manoeuvre=one, height=drawn.height + higher, aps=False)
     if drawn.failure is not Failure.NOTHING:
         return replace(drawn, failure_at=round(begin + chance.uniform(0.2, 3.0), 3))
+    return perhaps_one_wrong(chance, drawn, begin, begin + 3.0)
+
+
+def perhaps_one_wrong(
+    chance: random.Random, drawn: Scenario, begin: float, latest: float
+) -> Scenario:
+    """With any sensor of its autopilot wrong, from about begin to latest on, s, or none."""
     if chance.random() >= _WRONG_SENSOR:
         return drawn
-    return with_one_wrong(drawn, wrong_sensor(chance, drawn, begin, begin + 3.0))
-
-
-def wrong_sensor(
-    chance: random.Random, drawn: Scenario, begin: float, latest: float
-) -> SensorFault:
-    """Any of its autopilot's, from about begin to latest on, s."""
     sensors = sensors_of(drawn.vehicle)
     sensor = chance.choice(list(sensors))
     wrong = max(SETTLED, begin + chance.uniform(-0.5, latest - begin))
     end = round(wrong + chance.uniform(0.5, 4.0), 3)
-    return SensorFault(sensor, chance.choice(sensors[sensor]), round(wrong, 3), end)
+    fault = SensorFault(sensor, chance.choice(sensors[sensor]), round(wrong, 3), end)
+    return _with_one_wrong(drawn, fault)
 
 
-def with_one_wrong(drawn: Scenario, fault: SensorFault | EstimatorFault) -> Scenario:
+def _with_one_wrong(drawn: Scenario, fault: SensorFault | EstimatorFault) -> Scenario:
     """Of all that tells of the vehicle this is wrong, and nothing else."""
     others = [one for one in drawn.faults if not isinstance(one, SensorFault)]
     return replace(drawn, faults=(*others[: MOST_FAULTS - 1], fault))

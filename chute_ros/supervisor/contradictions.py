@@ -325,20 +325,24 @@ def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     if not known:
         return _carried_leaning(motion)
     force = fmean([one[2] for one in known])
-    upright = [one[1] for one in motion if one[3] >= _LEANS and not math.isnan(one[1])]
-    fastest = max(min(upright, default=-_BY_HAND) - _LIES_AND_SINKS, -_BY_HAND)
-    cosines = [one[3] for one in known]
-    by_hand = (
-        barometer.rate >= fastest
-        and abs(force - GRAVITY) <= _ITS_WEIGHT
-        and max(cosines) - min(cosines) <= _TUMBLES
-    )
-    if by_hand or barometer.rate >= -_LIES_AND_SINKS:
+    feels_its_weight = abs(force - GRAVITY) <= _ITS_WEIGHT
+    fastest = _sink_by_hand(motion, known) if feels_its_weight else -_LIES_AND_SINKS
+    if barometer.rate >= fastest:
         told = f"the barometer reports {barometer.rate:+.1f} m/s"
         return f"a force of {force:.1f} m/s^2 carries it, and {told}"
     if known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
         return ""
     return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"
+
+
+def _sink_by_hand(motion: tuple[Moment, ...], known: list[Moment]) -> float:
+    """The vertical speed with which what feels its weight may come down and be upright, m/s."""
+    cosines = [one[3] for one in known]
+    if max(cosines) - min(cosines) > _TUMBLES:
+        return -_LIES_AND_SINKS
+    upright = [one[1] for one in motion if one[3] >= _LEANS and not math.isnan(one[1])]
+    before = min(0.0, min(upright, default=-_BY_HAND))
+    return max(before - _LIES_AND_SINKS, -_BY_HAND)
 
 
 def _carried_leaning(motion: tuple[Moment, ...]) -> str:

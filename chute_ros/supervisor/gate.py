@@ -123,9 +123,9 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
 def _killed_alone(state: State) -> bool:
     """A person asked for the kill under way alone. One that came to nothing has stopped no motors,
     and what falls later does not fall by it; what fell before falls on as they wanted."""
-    kill, deployed = state.killing.kill, state.stage is Stage.DEPLOYED
+    kill, ordered = state.killing.kill, bool(state.deploying.deploys)
     # A parachute that came out by itself since then asks for no other one.
-    by_itself = deployed and state.killing.killed_in_flight and not state.deploying.deploys
+    by_itself = state.stage is Stage.DEPLOYED and state.killing.killed_in_flight and not ordered
     if state.stage is not Stage.KILLING and not by_itself:
         return False
     in_vain = kill is not None and kill.given_up and not kill.confirmed

@@ -19,6 +19,7 @@ from chute_ros.campaign.guards import GUARDS
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.pool import flown_here
 from chute_ros.errors import CampaignError, ChuteError
+from chute_ros.interrupts import once_more
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools.arguments import positive
 from chute_ros.tools.campaign_command import page_path
@@ -88,6 +89,7 @@ class _ComparisonProgress:
 
     def look(self, seeds: int) -> None:
         """One more seed has been flown with every guard."""
+        once_more()
         now = time.monotonic()
         if now - self._told_at < _TELL_EVERY:
             return

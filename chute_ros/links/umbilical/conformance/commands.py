@@ -22,16 +22,8 @@ _ARMS = "it is key armed, and disarmed again"
 _MAY_ARM, _MAY = "it must not, but it may be ARMED", "it must not, but it may FIRE"
 #: Close to a command, and none: by their case, brackets or number. No two of them join to one.
 _NEARLY_ARMS = (
-    b"KA",
-    b"(KA)",
-    b"<ka>",
-    b"<kA>",
-    b"<K>",
-    b"<A>",
-    b"<KAA>",
-    b"< KA>",
-    b"<KA\n",
-    b"<KA",
+    *(b"KA", b"(KA)", b"<ka>", b"<kA>", b"<K>", b"<A>", b"<KAA>", b"< KA>"),
+    *(b"<KA\n", b"<KA"),
 )
 _NEARLY_FIRES = (
     *(b"D", b"(D)", b"[d]", b"<DD>", b"< D>", b"<l>", b"(L)", b"L", b"<MS>", b"{M}", b"<v>"),

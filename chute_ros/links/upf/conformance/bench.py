@@ -415,6 +415,11 @@ class UpfBench(RecordingBench[TransferPacket]):
         values = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
         return (yield from self.call(bus_requests.EXECUTE_OPCODE, values))
 
+    def save_and_restart(self) -> Any:
+        """What was set is kept, whether it saves by itself or not; then as restart."""
+        yield from self.save()
+        return (yield from self.restart())
+
     def restart(self) -> Any:
         """Whether RestartNode is not refused; then it begins to start anew, if it does."""
         node, starts, since = self.node, self.starts, len(self.every)
@@ -463,8 +468,7 @@ class UpfBench(RecordingBench[TransferPacket]):
         """Whether it is under its own node id again, with the static node id that it had."""
         if not (yield from self.put_back(p.STATIC_NODE_ID)):
             return False
-        yield from self.save()
-        yield from self.restart()
+        yield from self.save_and_restart()
         self.node = self._home
         return (yield from self.is_back(_AWAY))
 

@@ -29,8 +29,7 @@ def _becomes_dynamic(bench: UpfBench) -> Any:
         raise not_tried("GetNodeInfo is not answered")
     if (yield from bench.set(p.STATIC_NODE_ID, 0)) != 0:
         raise failed(f"{p.STATIC_NODE_ID} 0 is not taken")
-    yield from bench.save()
-    yield from bench.restart()
+    yield from bench.save_and_restart()
     return unique_id
 
 
@@ -54,8 +53,7 @@ def _forgets(bench: UpfBench) -> Trial:
     yield from bench.comes_back(_COMES_WITHIN)
     since = len(bench.every)
     bench.gives_out = False
-    yield from bench.save()
-    yield from bench.restart()
+    yield from bench.save_and_restart()
 
     def asks(one: TransferPacket) -> bool:
         return one.kind == ALLOCATION and unique_id.startswith(bytes(one.values["unique_id"]))
