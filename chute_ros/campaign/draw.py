@@ -11,7 +11,10 @@ from chute_ros.campaign.draw_missions import on_a_mission
 from chute_ros.campaign.draw_world import SETTLED, in_the_world
 from chute_ros.campaign.scenario import (
     PROFILES,
+    ROS_WAYS,
     SECOND_SENSORS,
+    STANDBY_WAYS,
+    SUPERVISORS,
     ClockJump,
     Failure,
     Fault,
@@ -59,8 +62,6 @@ _LIKELY = {
         Failure.COMPUTER_SILENT: 1,
     },
 }
-_ROS_WAYS = ("to the supervisor", "from the supervisor")
-_STANDBY_WAYS = ("to the standby", "from the standby")
 #: So many aircraft have one, of so many of these one goes wrong, and so many fly as high as this,
 #: m: from there even the slowest rule is in time.
 _WITH_SECOND, _SECOND_FAULT, _WITH_SECOND_HIGH, _HIGH = 0.3, 0.4, 0.3, (120.0, 300.0)
@@ -139,7 +140,7 @@ def fault_around(chance: random.Random, vehicle: str, around: float, standby: bo
     """Anything that goes wrong besides the failure, at most 2 s before or after around, s."""
     begin, lasts = _when(chance, around)
     end = round(begin + lasts, 3)
-    supervisors = ("supervisor", "standby") if standby else ("supervisor",)
+    supervisors = SUPERVISORS[: 1 + standby]
     kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
     if kind == "sensor":
         sensors = sensors_of(vehicle)
@@ -159,7 +160,7 @@ def fault_around(chance: random.Random, vehicle: str, around: float, standby: bo
     if kind == "stop":
         who = chance.choice((*supervisors, *supervisors, *stopping_of(vehicle)))
         return Stop(who, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
-    ways = (*ways_of(vehicle), *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
+    ways = (*ways_of(vehicle), *ROS_WAYS, *(STANDBY_WAYS if standby else ()))
     return WayFault(chance.choice(ways), _spell(chance, begin, end))
 
 

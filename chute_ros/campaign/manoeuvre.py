@@ -36,6 +36,13 @@ class Manoeuvre:
     sink: float = 0.0
     slope: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.kind not in _FLOWN:
+            raise ValueError(f"manoeuvre {self.kind!r}: need one of {', '.join(_FLOWN)}")
+        length = "lasts" if self.kind == "transition" else "amount"
+        if not getattr(self, length) > 0.0:
+            raise ValueError(f"{length} of a {self.kind} is {getattr(self, length)}: need above 0")
+
     @property
     def lands(self) -> bool:
         """It ends on the ground."""

@@ -12,6 +12,7 @@ from chute_ros.campaign.bus import Plug
 from chute_ros.campaign.channel import Way
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.scenario import (
+    SUPERVISORS,
     ClockJump,
     Fault,
     Scenario,
@@ -59,7 +60,7 @@ class Rig(Course, ABC):
     def join_supervisors(self) -> None:
         """One, or two."""
         scenario = self.scenario
-        for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
+        for rank, name in enumerate(SUPERVISORS[: 1 + scenario.standby]):
             config = self.shipped.config(
                 scenario.vehicle, scenario.profile, scenario.standby, rank
             )

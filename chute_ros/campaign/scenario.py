@@ -46,6 +46,10 @@ class Failure(enum.Enum):
 
 PROFILES = ("multirotor", "fixed_wing", "rocket")
 
+#: The one that leads, and the one that stands by; what reaches each, and what it tells.
+SUPERVISORS = ("supervisor", "standby")
+ROS_WAYS = ("to the supervisor", "from the supervisor")
+STANDBY_WAYS = ("to the standby", "from the standby")
 #: Over which an autopilot tells.
 AUTOPILOT_WAYS = ("autopilot", AUTOPILOT_LINK)
 

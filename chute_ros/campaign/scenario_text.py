@@ -5,23 +5,39 @@ from __future__ import annotations
 
 import json
 import typing
+from collections.abc import Collection, Iterator
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NoReturn
 
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.scenario import (
+    AUTOPILOT_WAYS,
+    PROFILES,
+    ROS_WAYS,
+    SECOND_SENSORS,
+    STANDBY_WAYS,
+    SUPERVISORS,
     Autopilot,
     Canopy,
+    ClockJump,
     Failure,
     Fault,
     Person,
     Scenario,
+    Stalls,
+    Stop,
     Taped,
     WayFault,
     flown_vehicles,
+    sensors_of,
+    stopping_of,
+    ways_of,
 )
+from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
+from chute_ros.protocol.vehicle_merge import VEHICLE_STATE
+from chute_ros.sim.autopilot_kinds import KINDS
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
@@ -52,7 +68,7 @@ def text_of(scenario: Scenario, was: str) -> str:
 def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
     """The scenario, and what became of it. RecordError, with the file's name: it is none."""
     try:
-        whole = json.loads(text)
+        whole = json.loads(text, parse_constant=_no_number)
         if whole["format"] != FORMAT:
             raise RecordError(f"{named}: format {whole['format']}: need {FORMAT}")
         values = dict(whole["scenario"])
@@ -69,8 +85,14 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
             values["autopilot"] = {**values["autopilot"], "homing": homing}
         for name, kind in _PARTS.items():
             if values.get(name) is not None:
-                values[name] = kind(**values[name])
-        return Scenario(**values), str(whole["was"])
+                values[name] = _made(kind, values[name])
+        scenario: Scenario = _made(Scenario, values)
+        for what, name, known in _names(scenario):
+            if name not in known:
+                raise ValueError(f"{what} {name!r}: need one of {', '.join(known)}")
+        if scenario.flights < 1:
+            raise ValueError(f"flights is {scenario.flights}: need 1 or more")
+        return scenario, str(whole["was"])
     except (KeyError, TypeError, ValueError) as error:
         what = type(error).__name__
         raise RecordError(f"{named} is no scenario of a campaign: {what}: {error}") from None
@@ -91,6 +113,40 @@ def _fault(values: dict[str, Any]) -> Fault:
     fields = dict(values)
     kind = _FAULTS[fields.pop("kind")]
     if kind is WayFault:
-        fields["spell"] = Spell(**fields["spell"])
-    made: Fault = kind(**fields)
+        fields["spell"] = _made(Spell, fields["spell"])
+    made: Fault = _made(kind, fields)
     return made
+
+
+def _made(kind: type[Any], values: dict[str, Any]) -> Any:
+    """TypeError: a number is none."""
+    made = kind(**values)
+    for name, hint in typing.get_type_hints(kind).items():
+        value = getattr(made, name)
+        if hint in (int, float) and not isinstance(value, (int, float)):
+            raise TypeError(f"{name} is {value!r}: need a number")
+    return made
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")
+
+
+def _names(one: Scenario) -> Iterator[tuple[str, str, Collection[str]]]:
+    """What each name in it is of, the name, and what is known."""
+    ways = (*ways_of(one.vehicle), *ROS_WAYS, *STANDBY_WAYS, *SECOND_SENSORS)
+    autopilot = () if one.is_rocket else AUTOPILOT_WAYS[:1]
+    who = (*SUPERVISORS, *stopping_of(one.vehicle), *autopilot, *SECOND_SENSORS)
+    yield "profile", one.profile, PROFILES
+    yield "autopilot", one.autopilot.kind, KINDS
+    for source in one.vehicle_sources:
+        yield "vehicle source", source, (VEHICLE_STATE, *SECOND_SENSORS)
+    for fault in one.faults:
+        if isinstance(fault, WayFault):
+            yield "way", fault.way, ways
+        elif isinstance(fault, (Stop, Stalls, ClockJump)):
+            yield "who", fault.who, who
+        elif isinstance(fault, SensorFault):
+            sensors = SECOND_SENSORS[fault.source] if fault.source else sensors_of(one.vehicle)
+            yield "sensor", fault.sensor, sensors
+            yield "how", fault.how, sensors[fault.sensor]

@@ -9,7 +9,8 @@ from campaign_bench import scenario
 
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.draw import draw
-from chute_ros.campaign.scenario import Failure, Person, WayFault
+from chute_ros.campaign.manoeuvre import landing
+from chute_ros.campaign.scenario import Failure, Person, Stop, WayFault
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
@@ -43,6 +44,16 @@ def test_one_of_before_second_sources_hears_the_autopilot_alone() -> None:
 
 
 GOOD = text_of(scenario(Failure.MOTOR), "")
+FLOWN = text_of(
+    scenario(
+        Failure.NOTHING,
+        WayFault("autopilot", Spell(0.5, 2.0, loss=1.0)),
+        SensorFault("tilt", "jumps", 1.0, 2.0),
+        Stop("imu", 1.0, 1.0),
+        manoeuvre=landing(20.0, 3.0, 1.5, 1.0),
+    ),
+    "",
+)
 
 
 @pytest.mark.parametrize(
@@ -54,6 +65,16 @@ GOOD = text_of(scenario(Failure.MOTOR), "")
         (GOOD.replace("MOTOR", "WHEEL"), "KeyError: 'WHEEL'"),
         (GOOD.replace('"height"', '"depth"'), "TypeError"),
         ("[1]", "TypeError"),
+        (GOOD.replace("60.0", '"high"'), "height is 'high': need a number"),
+        (GOOD.replace("60.0", "NaN"), "NaN is no number"),
+        (GOOD.replace('"multirotor"', '"kite"'), "profile 'kite': need one of multirotor, "),
+        (GOOD.replace('"flights": 1', '"flights": 0'), "flights is 0: need 1 or more"),
+        (FLOWN.replace('"landing"', '"hover"'), "manoeuvre 'hover': need one of flip, throw, "),
+        (FLOWN.replace('"amount": 1.5', '"amount": 0.0'), "amount of a landing is 0.0: need"),
+        (FLOWN.replace('"imu"', '"eyes"'), "who 'eyes': need one of supervisor, standby, "),
+        (FLOWN.replace('"way": "autopilot"', '"way": "air"'), "way 'air': need one of "),
+        (FLOWN.replace('"tilt"', '"smell"'), "sensor 'smell': need one of height, speed, "),
+        (FLOWN.replace('"jumps"', '"hops"'), "how 'hops': need one of sticks, jumps, "),
     ],
 )
 def test_what_is_none_is_told_with_its_name(text: str, words: str) -> None:
