@@ -25,6 +25,7 @@ from chute_ros.tools.launch_checks import (
     check_vehicle,
     checked,
     place_of,
+    refused_at_start,
 )
 from launch import LaunchContext, LaunchDescription
 
@@ -69,6 +70,7 @@ def _nodes(context: LaunchContext) -> list:
             ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
             additional_env=environment,
             output="screen",
+            on_exit=refused_at_start(name),
             **LIVES_ON,
         )
         for package, name in started

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,9 @@ FAILURES = {
 _OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
 #: Where launch_ros keeps the namespace that a launch file has pushed.
 _PUSHED = "ros_namespace"
+#: What a node that refuses its settings exits with (chute_ros/ros/entry.py), and how long after the
+#: launch that still ends the launch, s: later the other nodes may be in the air.
+_REFUSED, _STARTS_WITHIN = 2, 60.0
 #: Two more follow it, and there is none above 65535.
 _LAST_PORT = 65533
 
@@ -67,6 +71,28 @@ def checked(launch_file: str, make: Callable[[], T]) -> T:
 def _refuse(text: str) -> NoReturn:
     print(text, file=sys.stderr)
     sys.exit(2)
+
+
+def refused_at_start(node: str) -> Callable[[Any, Any], None]:
+    """For on_exit of a node that is started again whenever it dies: a node that refuses to start
+    ends the whole launch, which would otherwise start it for ever. What `ros2 launch` catches from
+    an event is told in one line, and becomes its exit code 1."""
+    made = time.monotonic()
+    exits = 0
+
+    def on_exit(event: Any, context: Any) -> None:
+        nonlocal exits
+        exits += 1
+        if (
+            exits == 1
+            and event.returncode == _REFUSED
+            and time.monotonic() - made < _STARTS_WITHIN
+        ):
+            raise RuntimeError(
+                f"{node} refuses to start, for the reason that it has printed above"
+            )
+
+    return on_exit
 
 
 def given_to(context: Any) -> list[str]:

@@ -6,8 +6,10 @@ import itertools
 import subprocess
 import sys
 import tempfile
+import time
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import SimpleNamespace
 
 import ament_index_python.packages as ament
 import pytest
@@ -297,6 +299,36 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     if vehicle:
         started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+def exits_of(name, monkeypatch):
+    """What vehicle.launch.py does as its node name exits, by exit code."""
+    made = made_by(LAUNCH / "vehicle.launch.py", monkeypatch, parachute="mavlink")
+    (node,) = [one for one in made if one.options.get("executable") == name]
+    return lambda code: node.options["on_exit"](SimpleNamespace(returncode=code), None)
+
+
+@pytest.mark.parametrize("name", ["mavlink_parachute", "safety_supervisor"])
+def test_a_node_that_refuses_to_start_ends_the_launch(name, monkeypatch):
+    """It would be started again each 0.5 s, for ever."""
+    exited = exits_of(name, monkeypatch)
+    with pytest.raises(RuntimeError, match=f"^{name} refuses to start, for the reason"):
+        exited(2)
+
+
+@pytest.mark.parametrize("code", [0, 1, -9, -11])
+def test_a_node_that_dies_ends_nothing_and_neither_does_its_next_refusal(code, monkeypatch):
+    """The other nodes may be in the air."""
+    exited = exits_of("safety_supervisor", monkeypatch)
+    exited(code)
+    exited(2)
+
+
+def test_a_node_that_exits_with_2_long_after_the_launch_ends_nothing(monkeypatch):
+    exited = exits_of("safety_supervisor", monkeypatch)
+    later = time.monotonic() + 61.0
+    monkeypatch.setattr(time, "monotonic", lambda: later)
+    exited(2)
 
 
 @pytest.mark.parametrize("parachute", vehicles())
