@@ -53,7 +53,7 @@ FAILURES = {
 _OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
 #: Where launch_ros keeps the namespace that a launch file has pushed.
 _PUSHED = "ros_namespace"
-#: What a node that refuses its settings exits with (chute_ros/ros/entry.py), and how long after the
+#: Exit code of a node that refuses its settings (chute_ros/ros/entry.py), and how long after the
 #: launch that still ends the launch, s: later the other nodes may be in the air.
 _REFUSED, _STARTS_WITHIN = 2, 60.0
 #: Two more follow it, and there is none above 65535.
