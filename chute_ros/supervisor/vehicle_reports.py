@@ -72,7 +72,8 @@ def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
     _note_height_of_kill(turn)
     _note_reboots(turn, new, new.reboot_count > state.heard.vehicle.reboot_count)
     _note_faults(turn, new.faults)
-    if was_disarmed and new.armed is Armed.ARMED:
+    # A heartbeat that is wrong in the air moves no ground.
+    if was_disarmed and new.armed is Armed.ARMED and not turn.flight.airborne:
         height = readings.measured(turn.config, turn.state, "height", turn.now)
         turn.flight = replace(turn.flight, armed_height=0.0 if math.isnan(height) else height)
 

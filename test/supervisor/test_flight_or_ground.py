@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from story import STANDING, START, Story, changed, rule, vehicle, with_rules
+from story import STANDING, START, Story, changed, rule, shipped, vehicle, with_rules
 
 from chute_ros.model import Armed, LandedState, VehicleState
 from chute_ros.supervisor import flight, gate, readings
@@ -262,6 +262,17 @@ def test_how_high_above_where_it_was_armed_a_landing_takes_longer(
     assert flight.landed_hold(config, state) == hold
     off = changed(known(armed=Armed.DISARMED, height=height), armed_height=armed_height)
     assert flight.landed_hold(config, off) == 1.0
+
+
+def test_a_word_of_disarmed_in_the_air_moves_no_ground() -> None:
+    """Given a wrong heartbeat at 50 m, then a land detector that is wrong for 3 s."""
+    story = Story(shipped("multirotor")).ready()
+    story.fly(1.0, height=0.0, landed_state=LandedState.ON_GROUND).fly(3.0)
+    story.fly(4.0, armed=Armed.DISARMED)
+    story.fly(5.0)
+    story.fly(8.0, landed_state=LandedState.ON_GROUND)
+    assert story.state.flight.armed_height == pytest.approx(0.0, abs=0.1)
+    assert story.state.stage is Stage.IN_FLIGHT
 
 
 def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_take_off() -> None:
