@@ -4,8 +4,11 @@ condition of a rule, a heuristic that is named below. A part that no flight need
 The stored wrong flights are flown as well. A line names the flights that are wrong without a part
 and right with it, and the other way round. --together removes all named parts at once, flies each
 flight that differs again without each part alone, and so covers far more flights in the same time.
+--rules-page flies without each rule only the flights in which it decided, and writes what each
+rule contributes.
 
     make without [FLIGHTS=1000] [SEED=0] [WITHOUT_ARGS="--together 'multirotor: falling' ..."]
+    make without [FLIGHTS=1000] [SEED=0] WITHOUT_ARGS="--rules-page docs/evidence/contributions.md"
 """
 
 from __future__ import annotations
@@ -21,17 +24,20 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flight
-from chute_ros.campaign.judge import WRONG, judge
+from chute_ros.campaign.judge import WRONG, Count, judge
 from chute_ros.campaign.scenario import PROFILES, Scenario
 from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
+from chute_ros.errors import ChuteError
 from chute_ros.interrupts import at_ctrl_c
 from chute_ros.model import Action
 from chute_ros.supervisor import (
@@ -49,6 +55,9 @@ from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import Profile
 from chute_ros.tools.arguments import positive
 from chute_ros.tools.entry import INTERRUPTED
+from chute_ros.tools.machine import machine
+from chute_ros.tools.page_file import MARKDOWN, require_output, write_page
+from chute_ros.tools.pages import table
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "config" / "profiles"
@@ -201,40 +210,53 @@ class Without(Shipped):
         return replace(config, profile=functools.reduce(changed, self._names, config.profile))
 
 
-def fly(names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
-    """Flight -> how it is counted, for all that are wrong."""
+class Outcome(NamedTuple):
+    """What became of a flight. count: the name of a Count; decided: "profile: rule" of each rule
+    that decided something."""
+
+    count: str
+    decided: Sequence[str]
+
+
+def fly(names: Sequence[str], flights: Sequence[str]) -> dict[str, Outcome]:
+    """Flight -> its outcome, for all that the parts of these names concern."""
     for name in names:
         if name in HEURISTICS:
             where, attribute, instead = HEURISTICS[name]
             setattr(where, attribute, instead)
-    shipped, wrong = Without(names), {}
+    shipped, flown = Without(names), {}
     for flight_name in flights:
         scenario = scenario_named(flight_name)
         if concerns(names, scenario.profile):
-            judged = judge(Flight(scenario, shipped).run())
-            if judged.count in WRONG:
-                wrong[flight_name] = judged.count.name
-    return wrong
+            lived = Flight(scenario, shipped).run()
+            decided = {f"{scenario.profile}: {one.rule}" for _, one in lived.decided}
+            flown[flight_name] = Outcome(judge(lived).count.name, sorted(decided))
+    return flown
+
+
+def wrong_of(flown: Mapping[str, Outcome]) -> dict[str, str]:
+    """Flight -> how it is counted, for all that are wrong."""
+    return {name: one.count for name, one in flown.items() if Count[one.count] in WRONG}
 
 
 class Pool:
     """Flies in as many processes as there are jobs. python: the command of their interpreter."""
 
     def __init__(self, python: Sequence[str], jobs: int) -> None:
-        self._python, self._jobs = python, jobs
+        self._python, self.jobs = python, jobs
         self._threads = ThreadPoolExecutor(jobs)
         self._running: set[subprocess.Popen[str]] = set()
 
     def each(
         self, works: Sequence[tuple[Sequence[str], Sequence[str]]]
-    ) -> Iterator[dict[str, str]]:
-        """What is wrong of each (names, flights), in their order."""
+    ) -> Iterator[dict[str, Outcome]]:
+        """The outcomes of each (names, flights), in their order."""
         return self._threads.map(lambda one: self._in_own_process(*one), works)
 
-    def shared(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+    def shared(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, Outcome]:
         """The same of one, by all processes."""
-        parts = [(names, flights[n :: self._jobs]) for n in range(self._jobs)]
-        return {name: count for wrong in self.each(parts) for name, count in wrong.items()}
+        parts = [(names, flights[n :: self.jobs]) for n in range(self.jobs)]
+        return {name: one for flown in self.each(parts) for name, one in flown.items()}
 
     def end(self, *_: object) -> NoReturn:
         """At a Ctrl-C: nobody waits for what they fly now."""
@@ -243,7 +265,7 @@ class Pool:
         print("without: interrupted", file=sys.stderr, flush=True)
         os._exit(INTERRUPTED)
 
-    def _in_own_process(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+    def _in_own_process(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, Outcome]:
         """What was taken away comes back with it. A process that dies is started again."""
         work = json.dumps({"names": names, "flights": flights})
         command = [*self._python, __file__, "--work"]
@@ -254,7 +276,7 @@ class Pool:
             out, err = process.communicate(work)
             self._running.remove(process)
             if not process.returncode:
-                return dict(json.loads(out))
+                return {name: Outcome(*one) for name, one in json.loads(out).items()}
         why = "".join(err.strip().splitlines()[-1:]) or f"exit code {process.returncode}"
         sys.exit(f"without: one of its processes ended {_STARTS} times: {why}")
 
@@ -282,11 +304,12 @@ def some(flights: Sequence[str], counts: dict[str, str]) -> str:
 def each_alone(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
     """A table with a line for each."""
     says(f"flies {len(flights)} flights as they are")
-    base = pool.shared((), flights)
+    base = wrong_of(pool.shared((), flights))
     says(f"and as often without each of {len(names)}")
     print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|", flush=True)
     flown = pool.each([((name,), flights) for name in names])
-    for name, wrong in zip(names, flown, strict=True):
+    for name, one in zip(names, flown, strict=True):
+        wrong = wrong_of(one)
         worse, better = differing((name,), base, wrong)
         print(f"| {name} | {some(worse, wrong)} | {some(better, base)} |", flush=True)
 
@@ -294,15 +317,15 @@ def each_alone(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None
 def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
     """A table with a line for each that a flight needs by itself."""
     says(f"flies {len(flights)} flights as they are")
-    base = pool.shared((), flights)
+    base = wrong_of(pool.shared((), flights))
     print(f"{len(base)} of {len(flights)} are wrong with all", flush=True)
     says(f"and without all of {len(names)}")
-    wrong = pool.shared(names, flights)
+    wrong = wrong_of(pool.shared(names, flights))
     worse, better = differing(names, base, wrong)
     print(f"without: wrong {some(worse, wrong)}; right {some(better, base)}", flush=True)
     differ = (*worse, *better)
     says(f"{len(differ)} that differ, without each of {len(names)}")
-    alone = list(pool.each([((name,), differ) for name in names]))
+    alone = [wrong_of(one) for one in pool.each([((name,), differ) for name in names])]
     print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|")
     unclear = set(differ)
     base = {name: count for name, count in base.items() if name in differ}
@@ -311,6 +334,81 @@ def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
         unclear -= {*worse, *better}
         print(f"| {name} | {some(worse, found)} | {some(better, base)} |")
     print(f"by none of them alone: {', '.join(sorted(unclear)) or 'none'}")
+
+
+def deciding_rules() -> list[str]:
+    """ "profile: rule" of each rule that stops motors or releases, in the profile's order."""
+    return [
+        f"{name}: {rule.name}"
+        for name in PROFILES
+        for rule in read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",)).rules
+        if rule.action in (Action.KILL, Action.DEPLOY)
+    ]
+
+
+def contributions(pool: Pool, flights: Sequence[str]) -> list[tuple[str, ...]]:
+    """A row for each rule: without it, only the flights in which it decided can end otherwise."""
+    says(f"flies {len(flights)} flights as they are")
+    base = pool.shared((), flights)
+    used = {
+        rule: [name for name in flights if rule in base[name].decided] for rule in deciding_rules()
+    }
+    some_used = [rule for rule, names in used.items() if names]
+    again = sum(map(len, used.values()))
+    says(
+        f"and {again} again, without a rule that decided in them ({len(some_used)} of {len(used)})"
+    )
+    flown = pool.each([((rule,), used[rule]) for rule in some_used])
+    without = dict(zip(some_used, flown, strict=True))
+    rows, wrong_before = [], wrong_of(base)
+    for rule, names in used.items():
+        wrong = wrong_of(without.get(rule, {}))
+        worse, spoilt = differing(
+            (rule,), {n: wrong_before[n] for n in names if n in wrong_before}, wrong
+        )
+        counts = Counter(wrong[name] for name in worse)
+        saved = (counts.pop(one.name, 0) for one in (Count.MISSED, Count.LATE))
+        numbers = (len(names), *saved, counts.total(), len(spoilt))
+        profile, _, name = rule.partition(": ")
+        rows.append((profile, name, *map(str, numbers), ", ".join(spoilt[:4])))
+    return rows
+
+
+INTRODUCTION = """\
+Each rule of a profile that stops motors or releases: in how many flights of the [fault
+campaign](campaign.md) it decided something, and how those flights are counted when they are flown
+again without the rule. A flight in which a rule decided nothing is the same without it.
+
+- **Only it saves**: the flight is correct with the rule, and missed or late without it.
+- **Wrong otherwise**: the flight is correct with the rule, and false, doubled or out of order
+  without it, as where a later rule decides something else.
+- **Only it spoils**: the flight is wrong with the rule, and correct without it; its first seeds.
+
+Where a rule decided, and neither saves nor spoils, another rule decides in time without it, or a
+person had decided. A rule with few flights is no proof that it is not needed: some of what the
+rules are for (`source` in the profile) is drawn seldom or not at all, as what field reports
+tell."""
+
+_HEAD = (
+    *("profile", "rule", "decided in", "only it saves: missed", "late", "wrong otherwise"),
+    *("only it spoils", "seeds"),
+)
+
+
+def write_contributions(pool: Pool, flights: Sequence[str], seed: int, path: pathlib.Path) -> None:
+    """The page of what each rule contributes."""
+    begun = time.monotonic()
+    rows = contributions(pool, flights)
+    command_of_it = f"make without FLIGHTS={len(flights)} SEED={seed}"
+    told = f"{time.monotonic() - begun:.0f} s, {pool.jobs} at a time on {machine()}"
+    parts = [
+        "# What each rule contributes",
+        f'Written by `{command_of_it} WITHOUT_ARGS="--rules-page {path}"`: {told}.',
+        INTRODUCTION,
+        table(_HEAD, rows),
+    ]
+    write_page(path, "\n\n".join(parts) + "\n", MARKDOWN)
+    print(f"without: {path} is written")
 
 
 def command(text: str) -> list[str]:
@@ -339,6 +437,9 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="name all, and end")
     parser.add_argument("--together", action="store_true", help="all of them at once")
     parser.add_argument(
+        "--rules-page", type=pathlib.Path, metavar="FILE", help="write what each rule contributes"
+    )
+    parser.add_argument(
         "--flights", type=positive, default=1000, help="number of flights (default: 1000)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
@@ -356,8 +457,16 @@ def main() -> None:
         print("\n".join(chosen))
         return
     flights = [str(seed) for seed in range(options.seed, options.seed + options.flights)]
-    flights += sorted(path.stem for path in STORED.glob("*.json"))
     pool = Pool(options.python, options.jobs)
+    if options.rules_page:
+        try:
+            require_output(options.rules_page, MARKDOWN)
+        except ChuteError as error:
+            parser.error(str(error))
+        with at_ctrl_c(pool.end):
+            write_contributions(pool, flights, options.seed, options.rules_page)
+        return
+    flights += sorted(path.stem for path in STORED.glob("*.json"))
     with at_ctrl_c(pool.end):
         (together if options.together else each_alone)(pool, chosen, flights)
 

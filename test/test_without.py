@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
 
 import pytest
 import without
-from without import FOLDER, HEURISTICS, changed, concerns, differing, fly, profile_parts
+from without import (
+    FOLDER,
+    HEURISTICS,
+    changed,
+    concerns,
+    contributions,
+    deciding_rules,
+    differing,
+    fly,
+    profile_parts,
+    wrong_of,
+)
 
 from chute_ros.campaign.scenario import PROFILES
 from chute_ros.supervisor.profile_reader import read_profile
@@ -53,9 +65,37 @@ def test_what_differs_is_told_both_ways(monkeypatch: pytest.MonkeyPatch) -> None
     assert differing(("flight: a ground below home",), base, wrong) == (["3"], ["1"])
     # 910000025 sinks level, without its thrust.
     rule = "multirotor: uncommanded sink"
-    assert fly((), ("910000025",)) == {}
-    assert fly((rule,), ("910000025",)) == {"910000025": "MISSED"}
+    assert wrong_of(fly((), ("910000025",))) == {}
+    assert wrong_of(fly((rule,), ("910000025",))) == {"910000025": "MISSED"}
     assert without.some(["3"], wrong) == "1 (3 MISSED)"
+
+
+class HerePool:
+    """Flies in this process."""
+
+    def __init__(self) -> None:
+        self.works: list[tuple[Sequence[str], Sequence[str]]] = []
+
+    def shared(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, without.Outcome]:
+        return fly(names, flights)
+
+    def each(
+        self, works: Sequence[tuple[Sequence[str], Sequence[str]]]
+    ) -> list[dict[str, without.Outcome]]:
+        self.works += works
+        return [fly(*one) for one in works]
+
+
+def test_a_rule_that_alone_saves_a_flight_is_told_and_one_that_decided_nothing_is_not_flown() -> (
+    None
+):
+    pool = HerePool()
+    rows = contributions(pool, ("910000025",))
+    assert [f"{row[0]}: {row[1]}" for row in rows] == deciding_rules()
+    told = {row[:2]: row[2:] for row in rows}
+    assert told["multirotor", "uncommanded sink"] == ("1", "1", "0", "0", "0", "")
+    assert told["multirotor", "free fall"] == ("0", "0", "0", "0", "0", "")
+    assert pool.works == [(("multirotor: uncommanded sink",), ["910000025"])]
 
 
 @pytest.mark.parametrize(
@@ -63,6 +103,7 @@ def test_what_differs_is_told_both_ways(monkeypatch: pytest.MonkeyPatch) -> None
     [
         (["multirotor: fallin"], "there is no 'multirotor: fallin': need 'multirotor: falling'"),
         (["no such thing"], "need one that --list has"),
+        (["--rules-page", "/dev/full/x"], "/dev/full/x: Not a directory"),
         (["--jobs", "0"], "0: need a whole number, 1 or more"),
         (["--python", "/no/such"], "'/no/such' is no command here"),
     ],
