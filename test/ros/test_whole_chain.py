@@ -86,7 +86,7 @@ def test_a_flight_from_its_block_to_the_ground_under_a_canopy(bench):
     flight.check_order_on_the_wire()
     assert flight.module.deployment == DeploymentTrigger.DRONE
     flight.await_stage(SafetyState.DEPLOYED)
-    assert flight.parachute[-1].deployed
+    bench.until(lambda: flight.parachute[-1].deployed, "its status says so")
     flight.await_vehicle("the motors are off", lambda v: v.armed == VehicleState.DISARMED)
     flight.await_vehicle("the canopy carries", lambda v: -11.0 < v.vertical_speed < -9.0)
     flight.await_vehicle("it has landed", lambda v: v.landed_state == 1)

@@ -53,7 +53,7 @@ def flying(name: str, *arguments: str, changed: str = "") -> Iterator[subprocess
     code that it runs first."""
     code = _TELLS_AT_ONCE.format(name=name, changed=changed)
     with subprocess.Popen(
-        [sys.executable, "-c", code, "--flights", "100000", *arguments],
+        [sys.executable, "-X", "faulthandler", "-c", code, "--flights", "100000", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -72,7 +72,11 @@ def interrupted(process: subprocess.Popen[str]) -> tuple[str, str, str]:
     assert process.stderr is not None
     first = process.stderr.readline()
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=120.0)
+    try:
+        out, err = process.communicate(timeout=120.0)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGABRT)  # it tells where it hangs
+        out, err = process.communicate()
     assert process.returncode == 130, err
     assert "Traceback" not in err
     return first, out, err
