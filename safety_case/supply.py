@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ machines: ``sbom.cdx.json`` beside these pages (CycloneDX).
 """
 #: An index that does not answer in this time is told as not asked, s.
 _PATIENCE = 120.0
+#: What a reason of the index says of one package alone.
+_OF_PACKAGE = re.compile(r": \S+ \([^)]*\)$")
 
 
 def write(out: Path) -> None:
@@ -116,8 +119,10 @@ def _index() -> str:
     ]
     asked = sum("vulns" in one for one in answer["dependencies"])
     if not asked:
-        why = answer["dependencies"][0].get("skip_reason", "") if answer["dependencies"] else ""
-        return f"It could not be asked: {plain(why[:200]) or 'it names no package'}."
+        # A package of ROS, which no index has, says so of itself alone.
+        reasons = Counter(_OF_PACKAGE.sub("", one["skip_reason"]) for one in answer["dependencies"])
+        why = reasons.most_common(1)[0][0] if reasons else "it names no package"
+        return f"It could not be asked: {plain(why[:200])}."
     told = "; ".join(found) or "none is known to be vulnerable"
     return f"{asked} packages were asked about; {told}."
 

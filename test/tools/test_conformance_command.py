@@ -217,6 +217,15 @@ def test_a_mistake_in_the_command_line_ends_with_2(
     assert f"conformance: {told}" in errors
 
 
+def test_help_without_a_device_names_them_and_is_no_mistake(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["conformance", "--help"])
+    with pytest.raises(SystemExit, match="0"):
+        command.main()
+    out, errors = capsys.readouterr()
+    assert "DEVICE is one of mavlink, umbilical, upf; `conformance DEVICE --help`" in out
+    assert errors == ""
+
+
 def test_a_mistake_ends_the_process_with_2() -> None:
     with started(*COMMAND, "mavlink", "--connection", "abc") as kit:
         out, errors = kit.communicate(timeout=60.0)

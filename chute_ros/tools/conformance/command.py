@@ -69,7 +69,9 @@ def main() -> None:
     device = _device(kinds)
     try:
         kit: Kit = load(kinds[device].kit)
-        chosen = _options(kinds, device, kit).parse_args()
+        arguments = sys.argv[1:]
+        arguments.remove(device)
+        chosen = _options(kinds, device, kit).parse_args(arguments)
         if chosen.list:
             _list(kit)
             return
@@ -84,9 +86,12 @@ def _device(kinds: Mapping[str, LinkKind]) -> str:
     named = next((one for one in sys.argv[1:] if not one.startswith("-")), "")
     if named not in kinds:
         names = ", ".join(kinds)
+        if not named and {"-h", "--help"} & {*sys.argv}:
+            print(f"{__doc__}\nDEVICE is one of {names}; `conformance DEVICE --help` has its options")
+            sys.exit(DONE)
         text = f"no kit is called {named!r}" if named else "no device is named"
         print(f"{__doc__}\nconformance: {text}: need one of {names}", file=sys.stderr)
-        sys.exit(DONE if {"-h", "--help"} & {*sys.argv} else MISTAKE)
+        sys.exit(MISTAKE)
     return named
 
 
@@ -95,7 +100,6 @@ def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.A
         f"conformance {device}",
         description=f"{kinds[device].description}: {kit.document}",
     )
-    options.add_argument("device", choices=[device], metavar=device, help="what is tried")
     options.add_argument(
         "--connection",
         default=kit.default_connection,

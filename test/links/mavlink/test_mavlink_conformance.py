@@ -380,6 +380,14 @@ def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     assert run.problem == f"aborted by Ctrl-C; {left}"
 
 
+def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
+    run = Run(sound())
+    run.to(lambda: bool(run.device.armed))
+    run.device.act("silent")
+    run.to()
+    assert run.problem.endswith("the device: it may be LEFT ARMED: no PARACHUTE_STATUS shows it")
+
+
 def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
     """Given one that dies of the last bytes that are no frame."""
     device = sound()

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of
-from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
+from chute_ros.conformance.clause import DecidedError, Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -238,13 +238,23 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
         if self.done is Risk.NONE:
             return "nothing was armed"
         yield from self.command(ARM, 0, EVERY)
-        status = yield from self.status()
-        if status.message.arm_status:
+        left = yield from self._armed_sources()
+        if left:
             yield from self.disarm_each()
-            status = yield from self.status()
-        if left := int(status.message.arm_status):
+            left = yield from self._armed_sources()
+        if left is None:
+            raise failed("the device: it may be LEFT ARMED: no PARACHUTE_STATUS shows it")
+        if left:
             raise failed(f"the device is LEFT ARMED: arm_status is {left} after all was disarmed")
         return "disarmed"
+
+    def _armed_sources(self) -> Any:
+        """arm_status of now; None: no PARACHUTE_STATUS came."""
+        try:
+            status = yield from self.status()
+        except DecidedError:
+            return None
+        return int(status.message.arm_status)
 
     def status_every(self, interval: int) -> Any:
         """The answer (ReceivedFrame) as PARACHUTE_STATUS is to come each so many us (-1: never,
