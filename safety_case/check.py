@@ -24,7 +24,10 @@ TOLD = ("NOBODY", "FLIGHT", "GROUND", "GROUND, FLIGHT")
 
 #: Folders of the tests; and of the modules each of which, or whose folder, a requirement names.
 TESTS = ("test/", "msg_defs/test/")
-MODULES = ("chute_ros/supervisor", "chute_ros/runtime", "chute_ros/links")
+MODULES = (
+    *("chute_ros/protocol", "chute_ros/supervisor", "chute_ros/runtime", "chute_ros/links"),
+    *("chute_ros/ros", "chute_ros/transport"),
+)
 
 #: Rows of the campaign's page: what fails, what else goes wrong, what a flight is counted as.
 ROWS = {*Failure.__members__, *(one.__name__ for one in get_args(Fault)), *Count.__members__}

@@ -120,7 +120,9 @@ def _index() -> str:
     asked = sum("vulns" in one for one in answer["dependencies"])
     if not asked:
         # A package of ROS, which no index has, says so of itself alone.
-        reasons = Counter(_OF_PACKAGE.sub("", one["skip_reason"]) for one in answer["dependencies"])
+        reasons = Counter(
+            _OF_PACKAGE.sub("", one["skip_reason"]) for one in answer["dependencies"]
+        )
         why = reasons.most_common(1)[0][0] if reasons else "it names no package"
         return f"It could not be asked: {plain(why[:200])}."
     told = "; ".join(found) or "none is known to be vulnerable"

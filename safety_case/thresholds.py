@@ -17,7 +17,8 @@ _COMPARE = ROOT / "docs" / "evidence" / "compare.md"
 _CURVE = "\n## False against missed\n"
 _INTRODUCTION = """
 From the shipped profiles themselves. WHY AND FROM WHERE is the text that stands beside the value
-in the profile; "ours" means that no public source gives it. How a rule counts:
+in the profile, and of a rule also what stands above all rules; "ours" means that no public source
+gives it. How a rule counts:
 ``docs/reference/rules.md``.
 """
 _MOVED = """
@@ -28,6 +29,7 @@ parachute could save, and the flights ended although they went well, in percent 
 campaign draws faults around each failure, far more often than flights have them: these shares
 compare guards, and are no rates of a fleet.
 """
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 #: How long a rule must hold and the like, as a profile names them.
 _COUNTS = ("for", "leak", "samples", "needed", "doubted", "clears")
 
@@ -50,9 +52,27 @@ def problems(folder: Path = _PROFILES) -> Iterable[str]:
             if not comments.get(name):
                 said = "say in a comment above it where it is from, or 'ours' and the reason"
                 yield f"{path.name}: {name} has no why; {said}"
+        shared, of_rules = _rule_comments(text)
         for name, rule in profile["rules"].items():
             if not rule.get("source"):
                 yield f"{path.name}: the rule '{name}' has no source"
+                continue
+            why = " ".join((rule["source"], *of_rules.get(name, ()), *shared))
+            known = {float(one) for one in _NUMBER.findall(why)}
+            for what, value in _limits_of(rule):
+                if abs(value) not in known:
+                    said = "name it in the rule's source or a comment: where it is from, or 'ours'"
+                    yield f"{path.name}: {what} of the rule '{name}' has no why; {said}"
+
+
+def _limits_of(rule: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Each limit in words, and its value."""
+    for condition in rule["conditions"]:
+        for key in ("above", "below", "until"):
+            if key in condition:
+                yield f"{condition['measurement']} {key} {condition[key]}", float(condition[key])
+    if "for" in rule:
+        yield f"for {rule['for']}", float(rule["for"])
 
 
 def _values(profile: Mapping[str, Any]) -> list[str]:
@@ -65,15 +85,16 @@ def _profile(profile: Mapping[str, Any], text: str) -> str:
     for name, limits in profile.get("measurements", {}).items():
         told = ", ".join(f"{key} {value}" for key, value in limits.items())
         values.append((f"``measurements: {name}``", plain(told), plain(comments[name])))
+    shared, of_rules = _rule_comments(text)
     rules = [
         (
             f"**{plain(name)}**\n\n{plain(rule.get('says', ''))}",
             _limits(rule),
-            plain(rule["source"]),
+            "\n\n".join(plain(one) for one in (rule["source"], *of_rules.get(name, ()))),
         )
         for name, rule in profile["rules"].items()
     ]
-    tables = []
+    tables = [plain(one) for one in shared]
     if values:
         tables.append(list_table(("value", "is", "why and from where"), values, (20, 16, 64)))
     head = ("rule", "holds while, and how long", "why and from where")
@@ -108,6 +129,28 @@ def _comments(text: str) -> Iterator[tuple[str, str]]:
             said = []
         elif not line.strip():
             said = []
+
+
+def _rule_comments(text: str) -> tuple[list[str], dict[str, list[str]]]:
+    """Of the rules: what stands above the first, paragraph by paragraph; and rule -> the comments
+    above it and in it."""
+    shared: list[str] = []
+    of_rules: dict[str, list[str]] = {}
+    said: list[str] = []
+    rule = ""
+    for line in [*text.partition("\nrules:\n")[2].splitlines(), ""]:
+        if line.lstrip().startswith("#"):
+            said.append(line.strip().removeprefix("#").strip())
+            continue
+        if found := re.match(r"  (\S[^:]*):$", line):
+            first, rule = not rule, found[1]
+            of_rules[rule] = []
+            if first:
+                shared, said = [" ".join(said)] * bool(said), []
+        if said:
+            of_rules[rule].append(" ".join(said))
+            said = []
+    return shared, of_rules
 
 
 def _moved() -> str:

@@ -349,8 +349,19 @@ def test_a_threshold_without_its_why_is_told(tmp_path, profile):
     path.write_text("\n".join(lines))
     read = yaml.safe_load(text)
     values = {*read, *read.get("measurements", ())} - {"profile", "rules", "measurements"}
-    told = list(thresholds.problems(tmp_path))
-    assert {one.split(" has no why")[0] for one in told} == {f"cut.yaml: {one}" for one in values}
+    told = {one.split(" has no why")[0] for one in thresholds.problems(tmp_path)}
+    of_values = {one for one in told if " of the rule " not in one}
+    assert of_values == {f"cut.yaml: {one}" for one in values}
+    assert told - of_values, "limits of rules whose why stood in a comment"
+
+
+def test_a_limit_of_a_rule_without_its_why_is_told(tmp_path):
+    text = (ROOT / "config" / "profiles" / "multirotor.yaml").read_text()
+    moved = text.replace("tilt_deg, above: 60.0, weight", "tilt_deg, above: 61.5, weight")
+    (tmp_path / "moved.yaml").write_text(moved.replace("    for: 0.2\n", "    for: 0.21\n", 1))
+    first, second = thresholds.problems(tmp_path)
+    assert first.startswith("moved.yaml: tilt_deg above 61.5 of the rule 'excess tilt' has no why")
+    assert second.startswith("moved.yaml: for 0.21 of the rule 'falling' has no why")
 
 
 def test_a_rule_without_its_source_is_told(tmp_path):
@@ -368,3 +379,5 @@ def test_the_page_of_thresholds_has_each_rule_of_each_profile(tmp_path, monkeypa
     assert "**uncommanded sink**" in text
     # What stands above a value in the profile is why it is so.
     assert "AP\\_PARACHUTE\\_ALT\\_MIN\\_DEFAULT" in text
+    assert "one motor of four gone leaves three quarters" in text, "a comment in a rule"
+    assert "Limits that several rules share" in text

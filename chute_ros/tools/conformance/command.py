@@ -87,7 +87,8 @@ def _device(kinds: Mapping[str, LinkKind]) -> str:
     if named not in kinds:
         names = ", ".join(kinds)
         if not named and {"-h", "--help"} & {*sys.argv}:
-            print(f"{__doc__}\nDEVICE is one of {names}; `conformance DEVICE --help` has its options")
+            options = "`conformance DEVICE --help` has its options"
+            print(f"{__doc__}\nDEVICE is one of {names}; {options}")
             sys.exit(DONE)
         text = f"no kit is called {named!r}" if named else "no device is named"
         print(f"{__doc__}\nconformance: {text}: need one of {names}", file=sys.stderr)
