@@ -339,6 +339,16 @@ def test_the_page_that_compares_says_what_was_scaled_as_its_code_does():
     assert CURVES in (ROOT / "docs" / "evidence" / "compare.md").read_text()
 
 
+def test_the_shares_in_the_mapping_are_those_of_the_page_that_compares():
+    page = (ROOT / "docs" / "evidence" / "compare.md").read_text()
+    row = next(line for line in page.splitlines() if line.startswith("| chute_ros |"))
+    aeroplanes, _, multirotors, _ = (
+        round(float(one)) for one in re.findall(r"\(([\d.]+) %\)", row)
+    )
+    told = f"compare.md: {multirotors} % of multirotors, {aeroplanes} % of aeroplanes"
+    assert told in (FOLDER / "mapping.sdoc").read_text()
+
+
 @pytest.mark.parametrize("profile", ["by_hand", "fixed_wing", "multirotor", "rocket"])
 def test_a_threshold_without_its_why_is_told(tmp_path, profile):
     text = (ROOT / "config" / "profiles" / f"{profile}.yaml").read_text()
