@@ -54,6 +54,8 @@ _FALLS_FOR, _NO_SPEED = 0.23, 2.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
+#: Of an autopilot that is silent the last command counts, nearer: by speed, and by the heights.
+_SINKS_ON, _SINKS_ON_BY_HEIGHTS = 1.0, 2.0
 #: In place of a measurement: that a wing sinks as its commanded attitude makes it. It leans by
 #: this at least, degrees: what falls flat does not.
 DIVE, _DIVES = "dive", 15.0
@@ -144,6 +146,18 @@ def commanded(
             told[ACCELERATION] = told[VERTICAL_SPEED]
     if climb_beyond_target <= _SINKS_AS_TOLD:
         told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"
+    return told
+
+
+def commanded_last(target: float, speed: float, rate: float) -> Mapping[str, str]:
+    """The same of a vehicle whose autopilot is silent: it sinks on as it was commanded last, which
+    what falls does not for long. target, speed: vertical, m/s; rate: CLIMB_RATE; NaN: not known.
+    A force that is missing is none of it."""
+    told = {}
+    if target - speed <= _SINKS_ON:
+        told[VERTICAL_SPEED] = f"it was commanded ({target:+.1f} m/s, when last heard)"
+    if target - rate <= _SINKS_ON_BY_HEIGHTS:
+        told[CLIMB_RATE] = f"it was commanded ({target:+.1f} m/s, when last heard)"
     return told
 
 

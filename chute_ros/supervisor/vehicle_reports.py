@@ -8,9 +8,16 @@ from types import MappingProxyType
 from chute_ros.model import Armed, VehicleState, pressure_altitude
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.contradictions import commanded, denials, height_denied, noted
+from chute_ros.supervisor.contradictions import (
+    commanded,
+    commanded_last,
+    denials,
+    height_denied,
+    noted,
+)
 from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measured import Sample
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
@@ -38,6 +45,8 @@ _LEVEL = 45.0
 #: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); a sensor is
 #: found fit or unfit by the samples of so long, s.
 _AT_REST, _FITNESS_TAKES = (7.8, 11.8), 1.0
+#: An autopilot that has reported anything so much later than its last command commands none, s.
+_COMMANDS_ON = 0.5
 #: A vehicle that was not heard as it was killed may be so much later, s.
 _HEARD_AFTER_KILL = 1.0
 
@@ -170,23 +179,38 @@ def _note_contradictions(turn: Turn) -> None:
         for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
     )
     # An estimator that is wrong follows its command where the vehicle does not.
-    climb_beyond = beyond + readings.measured(turn.config, state, VERTICAL_SPEED, now) - rate
+    speed = readings.measured(turn.config, state, VERTICAL_SPEED, now)
+    climb_beyond = beyond + speed - rate
     since = {name: state.heard.denied_since.get(name, now) for name in denied}
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
     off = state.heard.vehicle.armed is Armed.DISARMED
     told = {} if off else commanded(tilt, error, beyond, climb_beyond)
+    last_command = Sample(math.nan, math.nan) if off else _last_command(turn)
+    if math.isnan(beyond):
+        told = {**told, **commanded_last(last_command.value, speed, rate)}
     turn.heard = replace(
         turn.heard,
         motion=motion,
         denied=MappingProxyType(dict(denied)),
         denied_since=MappingProxyType(since),
         commanded=MappingProxyType(dict(told)),
+        commanded_speed=last_command,
     )
     last = state.heard.motion[-1][0] if state.heard.motion else now
     for name, begun in since.items():
         if state.flight.airborne and last < begun + CONTRADICTED_FOR <= now:
             turn.warn(f"{name} is contradicted: {denied[name]}")
     _note_fitness(turn)
+
+
+def _last_command(turn: Turn) -> Sample:
+    """The vertical speed that was commanded last, by an autopilot that is silent or goes on."""
+    vehicle, received = turn.heard.vehicle, turn.heard.vehicle_received
+    last = turn.heard.commanded_speed
+    if not math.isnan(vehicle.target_vertical_speed):
+        last = Sample(vehicle.target_vertical_speed, received - vehicle.target_age)
+    reported = received - min(vehicle.armed_age, vehicle.landed_state_age)
+    return last if reported <= last.measured_at + _COMMANDS_ON else Sample(math.nan, math.nan)
 
 
 def _height_denied(turn: Turn) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import pytest
 from story import DOWN, Story, pressure_at, shipped
 
-from chute_ros.model import Action
+from chute_ros.model import Action, Armed, LandedState, LinkState, VehicleState
+from chute_ros.supervisor import inputs as i
 
 EVERY = 0.1
 AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
@@ -200,3 +204,81 @@ def test_a_commanded_one_is_none() -> None:
         speed, tilt = max(-5.0, -0.45 * k), min(65.0, 12.0 * k)
         story.fly(story.t + 0.05, tilt=tilt, vertical_speed=speed, attitude_error=4.0)
     assert story.fired() == []
+
+
+# -- the last command of an autopilot that falls silent ------------------------------------------
+
+
+def silent(
+    story: Story,
+    seconds: float,
+    told: Callable[[float], dict[str, float]],
+    target: float = -8.9,
+) -> Story:
+    """An odometry reports on (told: t s after the silence began); of the autopilot nothing new,
+    and after a while what it reported is gone."""
+    began = story.t
+    while story.t < began + seconds and not story.fired():
+        t = story.t + 0.1 - began
+        state = VehicleState(
+            link_state=LinkState.OK if t < 2.5 else LinkState.LOST,
+            armed=Armed.ARMED,
+            armed_age=t + 0.1,
+            landed_state=LandedState.IN_AIR,
+            landed_state_age=t + 0.1,
+            target_vertical_speed=target if t < 3.0 else math.nan,
+            target_age=t + 0.1 if t < 3.0 else math.nan,
+            tilt=math.radians(5.0 + 0.01 * (story.t % 7)),
+            attitude_age=0.0,
+            height_age=0.0,
+            vertical_speed_age=0.0,
+            **told(t),
+        )
+        story.at(story.t + 0.1, story.heartbeat(), i.VehicleReport(state))
+    return story
+
+
+def descending(target: float = -8.9) -> Story:
+    """It comes down with 8.9 m/s, as it was commanded or not."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=160.0)
+    for step in range(1, 21):
+        sink = {"height": 160.0 - 0.89 * step, "vertical_speed": -8.9}
+        story.fly(story.t + 0.1, 0.1, target_vertical_speed=target, **sink)
+    return story
+
+
+def sinks_on(t: float) -> dict[str, float]:
+    wanders = 0.01 * (t * 10 % 3)
+    return {"height": 142.2 - 8.9 * t + wanders, "vertical_speed": -8.9 + wanders}
+
+
+def test_one_that_sinks_on_as_it_was_commanded_when_its_autopilot_fell_silent_does_not_fall() -> (
+    None
+):
+    assert silent(descending(), 8.0, sinks_on).fired() == []
+
+
+def test_one_whose_motors_stop_in_that_silence_falls() -> None:
+    def stops(t: float) -> dict[str, float]:
+        if t <= 1.0:
+            return sinks_on(t)
+        fell = t - 1.0
+        speed = -8.9 - 8.0 * fell
+        return {"height": 133.3 - 8.9 * fell - 4.0 * fell**2, "vertical_speed": speed}
+
+    story = silent(descending(), 5.0, stops)
+    assert story.fired() == ["KILL"]
+    assert story.t < 4.0 + 1.0 + 2.5, "as soon as the silence counts"
+
+
+def test_what_its_autopilot_commanded_before_it_commanded_nothing_hides_no_fall() -> None:
+    """A mode without targets for a second, in which it sinks on; then the silence."""
+    story = descending()
+    for step in range(1, 11):
+        sink = {"height": 142.2 - 0.89 * step, "vertical_speed": -8.9}
+        story.fly(story.t + 0.1, 0.1, **sink)
+    assert silent(story, 5.0, lambda t: sinks_on(t + 1.0), math.nan).fired() == ["KILL"]
+
+
+def test_nor_does_what_a_hover_was_commanded() -> None:
+    assert silent(descending(-0.1), 5.0, sinks_on, -0.1).fired() == ["KILL"]
