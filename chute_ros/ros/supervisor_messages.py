@@ -52,6 +52,7 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         message.decision_id = state.newest.id
         message.decision_action = int(state.newest.action)
         message.decision_rule = state.newest.rule
+    message.fired_id = told.fired
     return message
 
 

@@ -111,6 +111,8 @@ class SupervisorRuntime:
         self.afterwards = DeferredWork()
         #: The stamp of the newest heartbeat of each link, ns.
         self._stamps: dict[str, int] = {}
+        #: Id of the newest PastDecision.
+        self._fired = 0
         self._tokens = count(1)
         self._callers: dict[int, Callable[[inputs.Finish], None]] = {}
         self._beat_at = self._state_at = now
@@ -239,13 +241,17 @@ class SupervisorRuntime:
             if not output.again:
                 self._shell.log(Notice(Severity.WARNING, _told(output.decision)))
                 if output.decision.action in FIRES:
-                    self._shell.publish(PastDecision(output.decision, now))
+                    self._tell_past(PastDecision(output.decision, now))
 
     def _tell_history(self) -> None:
         """What whoever was before has decided, for whoever comes late."""
         kill = self.state.killing.kill
         for one in (*([kill] if kill else []), *self.state.deploying.deploys):
-            self._shell.publish(PastDecision(one.decision, one.decided_at))
+            self._tell_past(PastDecision(one.decision, one.decided_at))
+
+    def _tell_past(self, past: PastDecision) -> None:
+        self._fired = max(self._fired, past.decision.id)
+        self._shell.publish(past)
 
     # -- the lease ------------------------------------------------------------------------------
 
@@ -286,7 +292,14 @@ class SupervisorRuntime:
         self._told_at_once, self._state_at = _at_once(self.state), now + STATE_INTERVAL
         self._shell.keep(self.state)
         self._shell.publish(
-            safety_told(self.config, self.lease.config.name, self.state, dict(self._stamps), now)
+            safety_told(
+                self.config,
+                self.lease.config.name,
+                self.state,
+                dict(self._stamps),
+                now,
+                self._fired,
+            )
         )
 
 

@@ -79,14 +79,21 @@ class SafetyTold:
     #: Against a take-off; what warns as long as it holds.
     reasons: tuple[str, ...]
     alarms: tuple[str, ...]
+    #: Id of the newest PastDecision that was published; 0: none was.
+    fired: int = 0
 
 
 def safety_told(
-    config: SupervisorConfig, supervisor: str, state: State, stamps: Mapping[str, int], now: float
+    config: SupervisorConfig,
+    supervisor: str,
+    state: State,
+    stamps: Mapping[str, int],
+    now: float,
+    fired: int = 0,
 ) -> SafetyTold:
     """The picture of this state, s monotonic."""
     reasons, warns = block_reasons(config, state, now), alarms(config, state, now)
-    return SafetyTold(supervisor, state, stamps, now, reasons, warns)
+    return SafetyTold(supervisor, state, stamps, now, reasons, warns, fired)
 
 
 @dataclass(frozen=True)

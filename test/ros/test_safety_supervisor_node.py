@@ -86,6 +86,8 @@ def test_a_kill_and_a_deploy_are_found_later_with_their_reasons_and_their_time(r
         late = (now.header.stamp.sec - then.header.stamp.sec) * 1e9
         late += now.header.stamp.nanosec - then.header.stamp.nanosec
         assert abs(late) < 0.5e9, "stamped when it was decided"
+    newest = found[-1].id
+    ready.bench.until(lambda: ready.states[-1].fired_id == newest, "it tells which is the newest")
 
 
 # What devices ask for

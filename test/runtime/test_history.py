@@ -8,7 +8,7 @@ from runtime_shell import Shell
 
 from chute_ros.model import Action, Decision
 from chute_ros.runtime.supervisor import Start, SupervisorRuntime
-from chute_ros.runtime.topics import PastDecision
+from chute_ros.runtime.topics import PastDecision, SafetyTold
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.lease import LeaseConfig
@@ -62,6 +62,7 @@ def test_each_kill_and_deploy_is_told_again_and_no_flight_block_is() -> None:
     assert {told.decision.action for told in past} == {Action.KILL, Action.DEPLOY}
     assert any(d.action is Action.FLIGHT_BLOCK for d in shell.of(Decision))
     assert past[0].decided_at == 101.0
+    assert shell.of(SafetyTold)[-1].fired == decided[-1].id
 
 
 def test_a_supervisor_that_goes_on_tells_what_the_last_one_decided() -> None:
@@ -73,7 +74,11 @@ def test_a_supervisor_that_goes_on_tells_what_the_last_one_decided() -> None:
     (kill,) = {d for d in shell.of(Decision) if d.action is Action.KILL}
     # When it dies, and another process starts in its place,
     after = SupervisorShell()
-    start(after, 103.0, shell.kept).turn((), 103.0)
+    again = start(after, 103.0, shell.kept)
+    again.turn((), 103.0)
     # then whoever comes now finds the kill of before, with its time.
     first = after.of(PastDecision)[0]
     assert (first.decision, first.decided_at) == (kill, 101.0)
+    for number in range(30):
+        again.turn((), 103.1 + 0.05 * number)
+    assert after.of(SafetyTold)[-1].fired >= kill.id

@@ -12,10 +12,12 @@ from chute_msgs.msg import (
     SafetyDecision,
     SafetyState,
 )
-from heard_vehicle import Heard, heartbeat, parachute, stamped, state, vehicle
+from heard_vehicle import NOW, Heard, heartbeat, parachute, stamped, state, vehicle
 
+from chute_ros.tools.chute import listening as listening_module
 from chute_ros.tools.chute.hearing import MOST_NAMES
 from chute_ros.tools.chute.json_text import json_text
+from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.status_text import StatusLine, decision_lines, headline, order_lines
 
 
@@ -291,6 +293,40 @@ def test_whoever_comes_late_finds_the_newest_kill_and_deploy_with_their_reasons(
         "  KILL by rule 'free fall', 60 s ago",
         "      acceleration 0.65 (below 2)",
     ]
+
+
+class ScriptedSession:
+    """Whoever waits receives one message after the other, until what is waited for is there."""
+
+    namespace = "/drone1"
+
+    def __init__(self, heard, *messages):
+        self.node, self._heard, self.left = self, heard, [*messages]
+
+    def create_subscription(self, *_):
+        """Nothing comes by itself."""
+
+    def until(self, condition, seconds):
+        while not condition() and self.left:
+            self._heard.finds(self.left.pop(0))
+
+
+def test_an_older_kill_is_not_shown_as_the_newest_while_the_newest_is_on_its_way(
+    heard, monkeypatch
+):
+    """safety/history comes one by one, the oldest first."""
+    past = [decision(id=3, action=SafetyDecision.KILL), decision(id=7), decision(id=8)]
+    session = ScriptedSession(heard, *map(stamped, past))
+    listening = Listening(session)
+    listening.picture = heard.picture
+    monkeypatch.setattr(listening_module.time, "monotonic", lambda: NOW)
+    heard.hears(stamped(state(fired_id=8))).hears(heartbeat()).hears(stamped(parachute()))
+    heard.hears(vehicle())
+    assert "newest kill and deploy: number 8 was not received here yet; ask again" in heard.text()
+    shown = listening.settle(5.0)
+    assert session.left == []
+    assert [one.id for one in shown.decisions] == [3, 7, 8]
+    assert not any("not received here" in line for line in heard.text())
 
 
 def test_a_decision_that_was_received_is_no_other_when_it_is_found_again(heard):

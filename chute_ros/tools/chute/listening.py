@@ -93,10 +93,12 @@ class Listening:
         return living <= self.picture.heartbeats.keys()
 
     def _complete(self) -> bool:
-        """The state is no old one, and the vehicle and a parachute of each link were received; of
-        a link without a parachute that is waited for in vain."""
+        """The state is no old one, and the vehicle, the newest kill or deploy and a parachute of
+        each link were received; of a link without a parachute that is waited for in vain."""
         picture = self.view()
         if picture is None or is_old(picture.age) or picture.vehicle is None:
+            return False
+        if picture.not_received:  # the oldest comes first
             return False
         return {one.name for one in picture.links} <= {one.link for one in picture.parachutes}
 

@@ -71,7 +71,6 @@ def state_tone(state: str, unguarded: bool, warns: bool, armed: bool) -> str:
 
 def status_lines(picture: VehiclePicture) -> list[StatusLine]:
     """Everything but the decisions: for `chute status`, with the state first."""
-    fired = newest_fired(picture.decisions)
     return [
         headline(picture),
         *_about(picture),
@@ -85,7 +84,7 @@ def status_lines(picture: VehiclePicture) -> list[StatusLine]:
         *(line for one in picture.parachutes for line in _parachute(one)),
         *([] if picture.parachutes else [_no_parachute(picture)]),
         *_vehicle(picture),
-        *(decision_lines(fired, "newest kill and deploy") if fired else []),
+        *_fired(picture),
         *rule_lines(picture.rules),
         _newest(picture),
     ]
@@ -123,6 +122,15 @@ def newest_fired(decisions: Sequence[DecisionView]) -> list[DecisionView]:
     """The newest kill and the newest deploy, as far as they are known, the newest last."""
     newest = {one.action: one for one in decisions if one.action in _FIRES}
     return [one for one in decisions if newest.get(one.action) is one]
+
+
+def _fired(picture: VehiclePicture) -> list[StatusLine]:
+    title = "newest kill and deploy"
+    if picture.not_received:
+        text = f"{title}: number {picture.not_received} was not received here yet; ask again"
+        return [StatusLine(text, "warn")]
+    fired = newest_fired(picture.decisions)
+    return decision_lines(fired, title) if fired else []
 
 
 def decision_lines(decisions: Sequence[DecisionView], title: str) -> list[StatusLine]:

@@ -177,6 +177,8 @@ class VehiclePicture:
     rules: tuple[RuleView, ...]
     newest_decision: str
     decisions: tuple[DecisionView, ...]
+    #: Number of the newest kill or deploy where it was not received here; 0: it was, or none is.
+    not_received: int
 
     @property
     def why(self) -> str:
@@ -228,7 +230,12 @@ def view(picture: ReceivedMessages, namespace: str, now: float) -> VehiclePictur
         rules=tuple(map(_rule, message.rules)),
         newest_decision=_newest_decision(message),
         decisions=tuple(_decision(picture, one, now) for one in picture.decisions),
+        not_received=_not_received(picture, message.fired_id),
     )
+
+
+def _not_received(picture: ReceivedMessages, fired_id: int) -> int:
+    return 0 if fired_id in {number for _, number in picture.fired} else fired_id
 
 
 def reason_in(text: str, state: str) -> str:
