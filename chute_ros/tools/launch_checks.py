@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from chute_ros.errors import ChuteError, ParameterError
+from chute_ros.errors import ChuteError, ParameterError, ProfileError
 from chute_ros.links.api import SUPERVISOR, VehicleKind, load
 from chute_ros.links.registered import links, package_of, vehicles
 from chute_ros.ros.parameter_file import given_in, named_in
 from chute_ros.ros.parameters import MISSPELT, check_names, nearest
-from chute_ros.ros.supervisor_parameters import SupervisorParameters
+from chute_ros.ros.supervisor_parameters import SupervisorParameters, config_from
 from chute_ros.settings import Settings, parameters_of, settings_from
 from chute_ros.sim.bench_actions import (
     AUTOPILOT,
@@ -305,9 +305,12 @@ def _with_connection(given: Mapping[str, Any], connection: str | None) -> dict[s
 
 def _check_values(node: str, given: Mapping[str, Any], whose: str) -> None:
     try:
-        settings_from(_settings_of(node), given)
-    except ParameterError as error:
-        raise ParameterError(f"{whose}: {node}: {error}") from None
+        if node == SUPERVISOR:
+            config_from(given)  # with its profile
+        else:
+            settings_from(_settings_of(node), given)
+    except (ParameterError, ProfileError) as error:
+        raise type(error)(f"{whose}: {node}: {error}") from None
 
 
 def _settings_of(name: str) -> type[Settings]:

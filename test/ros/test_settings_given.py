@@ -287,6 +287,20 @@ def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
     assert len(nodes_of(made)) == 2
 
 
+def test_a_profile_that_no_supervisor_would_take_is_told_before_anything_starts(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(
+        GOOD.format("connection: udpin:0.0.0.0:1").replace("mode: SHADOW", "profile: by_hnd")
+    )
+    line = refused(monkeypatch, capsys, VEHICLE, parachute="mavlink", config=str(path))
+    assert line.startswith(f"{path}: safety_supervisor: parameter profile is 'by_hnd': ")
+    assert line.endswith(
+        "need one of by_hand, fixed_wing, multirotor, rocket, or the path of a file"
+    )
+
+
 def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "settings.yaml"
     path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))
