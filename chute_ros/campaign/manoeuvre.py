@@ -11,6 +11,10 @@ from chute_ros.sim.flight import GRAVITY
 
 #: A landing comes down so far with the speed of its touch-down, m.
 _LAST = 3.0
+#: What descends or dives on purpose speeds up with so much at most, m/s^2: faster than autopilots
+#: do by default (ArduPilot PILOT_ACC_Z 2.5, PX4 MPC_ACC_DOWN_MAX 3), and half of the weight is
+#: still felt.
+_SPEEDS_UP = 4.5
 
 
 class ManoeuvreMotion(NamedTuple):
@@ -63,8 +67,8 @@ def landing(
     clearance: float, sink: float, touches: float, begin: float, slope: float = 0.0
 ) -> Manoeuvre:
     """From so high above the ground, m, with these, m/s, until it slows down and as it touches."""
-    # The first second is half as fast, and so it slows down.
-    lasts = max(1.0, (clearance - _LAST - (sink + touches) / 2.0) / sink + 0.5)
+    slows = (sink + touches) / 2.0  # m, in a second
+    lasts = max(1.0, (clearance - _LAST - slows) / sink + sink / (2.0 * _SPEEDS_UP))
     return Manoeuvre("landing", touches, begin, round(lasts, 2), sink, slope)
 
 
@@ -88,17 +92,22 @@ def _throw(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     return _stopped(-GRAVITY * one.amount, passed - one.amount, 1.0)
 
 
+def _sinking(sink: float, lean: float, force: float, passed: float) -> ManoeuvreMotion:
+    """Down with ever more, until it is this sink, m/s, in which it feels this force, m/s^2."""
+    speeds_up = _SPEEDS_UP if _SPEEDS_UP * passed < sink else 0.0
+    return ManoeuvreMotion(-min(sink, _SPEEDS_UP * passed), lean, force - speeds_up)
+
+
 def _dive(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     if passed < one.lasts:
-        sink = one.sink * min(1.0, passed / 0.5)
-        return ManoeuvreMotion(-sink, math.radians(one.amount), 1.1 * GRAVITY)
-    return _stopped(-one.sink, passed - one.lasts, 1.0)
+        return _sinking(one.sink, math.radians(one.amount), 1.1 * GRAVITY, passed)
+    return _stopped(-min(one.sink, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
 
 
 def _descent(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     if passed < one.lasts:
-        return ManoeuvreMotion(-one.amount * min(1.0, passed), 0.2, GRAVITY)
-    return _stopped(-one.amount, passed - one.lasts, 1.0)
+        return _sinking(one.amount, 0.2, GRAVITY, passed)
+    return _stopped(-min(one.amount, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
 
 
 def _transition(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
@@ -113,7 +122,7 @@ def _transition(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
 def _landing(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     """Down, slower before the ground, and on until it is there."""
     if passed < one.lasts:
-        return ManoeuvreMotion(-one.sink * min(1.0, passed), 0.1, GRAVITY)
+        return _sinking(one.sink, 0.1, GRAVITY, passed)
     slowed = min(1.0, passed - one.lasts)
     braked = one.sink - one.amount if slowed < 1.0 else 0.0
     return ManoeuvreMotion(-one.sink + slowed * (one.sink - one.amount), 0.05, GRAVITY + braked)

@@ -7,7 +7,7 @@ import math
 import pytest
 from campaign_bench import flown
 
-from chute_ros.campaign.manoeuvre import Manoeuvre
+from chute_ros.campaign.manoeuvre import Manoeuvre, landing
 from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.vehicle import WindyModel
 from chute_ros.sim.flight import GRAVITY
@@ -34,8 +34,8 @@ def track(manoeuvre: Manoeuvre):
     [
         (FLIP, (3.0, 6.0), (170.0, 180.0), 0.25 * GRAVITY),
         (THROW, (9.5, 10.0), (5.0, 6.0), 0.5),
-        (DIVE, (6.0, 6.0), (70.0, 70.0), GRAVITY),
-        (DESCENT, (8.0, 8.0), (11.0, 12.0), GRAVITY),
+        (DIVE, (6.0, 6.0), (70.0, 70.0), 1.1 * GRAVITY - 4.5),
+        (DESCENT, (8.0, 8.0), (11.0, 12.0), GRAVITY - 4.5),
     ],
 )
 def test_it_is_flown_and_then_the_vehicle_hovers(manoeuvre, sink, tilt, lightest) -> None:
@@ -62,3 +62,30 @@ def test_nothing_falls_in_a_manoeuvre() -> None:
     end = flown(Failure.NOTHING, manoeuvre=THROW, height=80.0)
     assert not end.truth.falls
     assert math.isnan(end.landed)
+
+
+@pytest.mark.parametrize(
+    "manoeuvre",
+    [
+        FLIP,
+        THROW,
+        DIVE,
+        Manoeuvre("dive", 45.0, 1.0, 2.0, 9.0),
+        DESCENT,
+        Manoeuvre("descent", 13.0, 1.0, 8.0),
+        Manoeuvre("transition", 40.0, 1.0, 3.0, 5.0),
+        landing(30.0, 8.0, 1.0, 1.0),
+    ],
+)
+def test_it_speeds_up_downwards_by_no_more_than_its_force_lets_it(manoeuvre) -> None:
+    """A descent that begins with 12 m/s^2 and feels its whole weight is that of no vehicle."""
+    step, before = 0.02, manoeuvre.at(0.0)
+    for number in range(1, 1000):
+        now = manoeuvre.at(number * step)
+        if now is None:
+            break
+        speeds_up = (before.vertical_speed - now.vertical_speed) / step
+        carried = min(one.force * math.cos(one.roll) for one in (before, now))
+        assert speeds_up <= GRAVITY - carried + 0.3 * GRAVITY, number * step
+        before = now
+    assert number > 10
