@@ -13,7 +13,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 _UNKNOWN_SOURCE = 256
 #: What is not the automatic release.
 _BY_SOMEBODY = (TriggerFlags.MANUAL, TriggerFlags.FC, TriggerFlags.OFFBOARD)
-_NO_FLIGHT = "nothing on a bench climbs, and the conditions are the developer's"
+_NO_FLIGHT = "a device on a bench does not climb, and the conditions are developer-specific"
 _DOES = "it arms and disarms trigger sources, also those that fire by themselves"
 
 

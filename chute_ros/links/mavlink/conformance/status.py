@@ -287,19 +287,19 @@ CLAUSES = (
     _errors(
         "error-reported",
         "what is wrong with it has its flag in error_status",
-        OutOfReach("the kit makes nothing go wrong: the document names no way to"),
+        OutOfReach("the document names no way to cause an error"),
         READS,
     ),
     _safe(
         "ground-cleared",
         "GROUND_CLEARED is raised at a safe distance from the ground",
-        OutOfReach("nothing on a bench climbs"),
+        OutOfReach("a device on a bench does not climb"),
         READS,
     ),
     _safe(
         "geofence-mission",
         "it fetches a geofence by the mission protocol, and then reports GEOFENCE_MISSION_SET",
-        OutOfReach("the kit is no autopilot that has a geofence: leaving it would release"),
+        OutOfReach("the kit has no geofence to give, and a device outside of one may release"),
         READS,
     ),
     _told(

@@ -507,7 +507,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _PARAMETERS,
         "resister",
         "Enable CANBUS resister connects the 120 ohm of the bus",
-        OutOfReach("nothing on the bus measures it, and another resistor may disturb the bus"),
+        OutOfReach("no message shows the resistor, and switching it may disturb the bus"),
         READS,
     ),
     clause(_STANDARD, "opcode-save", "ExecuteOpcode saves", _opcode, "it saves its parameters"),
@@ -515,7 +515,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         _STANDARD,
         "opcode-erase",
         "ExecuteOpcode erases: its parameters are as delivered",
-        OutOfReach("the settings of its owner would be lost"),
+        OutOfReach("the owner's settings would be lost"),
         READS,
     ),
     clause(
