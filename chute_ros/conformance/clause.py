@@ -70,6 +70,17 @@ def not_tried(why: str) -> DecidedError:
 
 
 @dataclass(frozen=True)
+class OutOfReach:
+    """The trial of a clause that no bench can show. why: the reason."""
+
+    why: str
+
+    def __call__(self, bench: object) -> Trial:
+        yield from ()
+        raise not_tried(self.why)
+
+
+@dataclass(frozen=True)
 class Wait:
     """A trial goes on at this time (monotonic s), or as soon as ready says so. It is sent back
     whether ready did."""
@@ -107,6 +118,11 @@ class Clause(Generic[BenchT]):
     needs: str = ""
     without: str = ""
     restarts: bool = False
+
+    @property
+    def in_reach(self) -> bool:
+        """A bench can show it."""
+        return not isinstance(self.trial, OutOfReach)
 
 
 @dataclass(frozen=True)

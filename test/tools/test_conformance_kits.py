@@ -53,7 +53,10 @@ def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     ("device", "needs"),
     [
         *((device, SOAK) for device in KITS),
-        *(("upf", needs) for needs in ("--dna", "--trigger --soak", "--trigger --dna")),
+        *(
+            ("upf", needs)
+            for needs in ("--dna", "--deploy-force", "--trigger --soak", "--trigger --dna")
+        ),
         *(("umbilical", needs) for needs in ("--reboot", "--wipe")),
         ("mavlink", "--signing-key-file"),
     ],

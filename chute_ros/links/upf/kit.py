@@ -11,6 +11,7 @@ from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import (
     A_CONTROLLER,
     A_TRIGGER,
+    DEPLOY_FORCE,
     DNA,
     TRIGGER,
     VEHICLE,
@@ -32,6 +33,8 @@ from chute_ros.transport.wire import Wire
 _NODE_ID = number("node id", 1, 125)
 #: Of what is simulated, s.
 _SOAK = 20.0
+#: A fault for a while as it is only listened to, for the clause that needs one.
+_FAULT = {"block-when-abnormal": [(2.0, "error=IMU"), (3.0, "clear-errors")]}
 
 
 def _add_options(options: ArgumentParser) -> None:
@@ -49,6 +52,11 @@ def _add_options(options: ArgumentParser) -> None:
         BROADCAST,
         action="store_true",
         help="fire the trigger by the broadcast TriggerLaunch, in place of TriggerService",
+    )
+    options.add_argument(
+        DEPLOY_FORCE,
+        action="store_true",
+        help="fire the controller by TYPE_DEPLOY_FORCE, in place of TYPE_DEPLOY",
     )
     options.add_argument(
         "--vehicle-node",
@@ -94,7 +102,7 @@ def _simulated(broken: str, needs: str) -> tuple[UpfBus, UpfBench]:
     controller = simulated_controller(definitions, ControllerSettings(), broken)
     trigger = simulated_trigger(definitions, "upf.trigger", TRIGGER_NODE_ID, broken)
     alone = TRIGGER in needs
-    bus = UpfBus([trigger] if alone else [controller, trigger])
+    bus = UpfBus([trigger] if alone else [controller, trigger], _FAULT.get(broken))
     device = A_TRIGGER if alone else A_CONTROLLER
     return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK, dna=DNA in needs, device=device)
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from chute_ros.conformance.clause import Clause, Result, Verdict
+from chute_ros.conformance.clause import Clause, OutOfReach, Result, Verdict
 from chute_ros.conformance.kit import Kit
 from chute_ros.links.api import load
 from chute_ros.links.registered import links
@@ -21,7 +21,8 @@ _HEAD = """# Conformance kits on devices that break each clause
 
 Written by `make conformance`. Each kit ([guide](../guide/conformance.md)) tries its simulated
 device in virtual time: sound, and wrong in one clause after the other. A kit that fails another
-clause, or not the one that is broken, is a failure of the command.
+clause, or not the one that is broken, is a failure of the command. What no bench can show is not
+tried: its reason stands in its place.
 """
 
 
@@ -49,8 +50,12 @@ def _part(device: str, kit: Kit) -> tuple[str, list[str]]:
     """Of the page, and what is wrong."""
     sound = tried(kit, "")
     problems = [f"{device}, sound: {one.clause.name}: {one.why}" for one in _failed(sound)]
-    rows, found = [], 0
+    rows, found, broken = [], 0, 0
     for clause in kit.clauses:
+        if isinstance(clause.trial, OutOfReach):
+            rows.append(_row(clause, f"not tried: {clause.trial.why}", []))
+            continue
+        broken += 1
         failed = _failed(tried(kit, clause.name))
         others = [one.clause.name for one in failed if one.clause.name != clause.name]
         mine = [one.why for one in failed if one.clause.name == clause.name]
@@ -62,7 +67,7 @@ def _part(device: str, kit: Kit) -> tuple[str, list[str]]:
     verdicts = [one.verdict for one in sound]
     counted = ", ".join(f"{verdicts.count(one)} {one.value}" for one in Verdict if one in verdicts)
     told = (
-        f"The sound device: {counted}. Of {len(rows)} devices that break a clause each, {found} "
+        f"The sound device: {counted}. Of {broken} devices that break a clause each, {found} "
         "failed in that clause and in no other."
     )
     heads = ("clause", "section", "what the document says", "seen of a device that breaks it")

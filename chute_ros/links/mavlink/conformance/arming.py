@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from chute_ros.conformance.clause import Risk, Trial, failed, not_supported
+from chute_ros.conformance.clause import READS, OutOfReach, Risk, Trial, failed, not_supported
 from chute_ros.links.mavlink.conformance.bench import ARM, EVERY, MavlinkBench, refused
 from chute_ros.links.mavlink.conformance.document import PARACHUTE, of
 from chute_ros.model import TriggerFlags
@@ -13,6 +13,7 @@ from chute_ros.protocol.mavlink.dialect import dialect
 _UNKNOWN_SOURCE = 256
 #: What is not the automatic release.
 _BY_SOMEBODY = (TriggerFlags.MANUAL, TriggerFlags.FC, TriggerFlags.OFFBOARD)
+_NO_FLIGHT = "a device on a bench does not climb, and the conditions are developer-specific"
 _DOES = "it arms and disarms trigger sources, also those that fire by themselves"
 
 
@@ -173,6 +174,18 @@ CLAUSES = (
         Risk.ARMS,
     ),
     _arms("disarm-all", "all sources can be disarmed at once", _disarm, _DOES, Risk.ARMS),
+    _arms(
+        "auto-arm",
+        "with ATS_AUTO_ARM it arms its ATS above ats_arm_altitude",
+        OutOfReach(_NO_FLIGHT),
+        READS,
+    ),
+    _arms(
+        "auto-disarm",
+        "with ATS_AUTO_DISARM it disarms its ATS below ats_arm_altitude",
+        OutOfReach(_NO_FLIGHT),
+        READS,
+    ),
     of(PARACHUTE, "MAV_CMD_DO_PARACHUTE")(
         "automatic-release",
         "actions 1 and 0 enable and disable the automatic release",

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 from chute_ros.conformance.clause import READS, Trial, failed, not_supported, not_tried
-from chute_ros.links.mavlink.conformance.bench import MavlinkBench, entry_name, refused, result_of
+from chute_ros.links.mavlink.conformance.bench import (
+    MavlinkBench,
+    ReceivedFrame,
+    entry_name,
+    refused,
+    result_of,
+)
 from chute_ros.links.mavlink.conformance.document import HEARTBEAT, PARACHUTE, of
+from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.protocol.mavlink.dialect import dialect
 
 #: So long the device is looked at, s: some periods of 1 Hz.
 WATCHED = 8.0
 #: A period of nominally 1 s is in this range, s.
 _SHORTEST, _LONGEST = 0.5, 2.0
+#: 2009-01-01, s since 1970: no MAVLink device is older.
+_FIRST_DATE = 1_230_768_000
+#: Two of its messages are asked for so far apart; its clock may be off by this much, s.
+_APART, _CLOCK = 2.0, 0.3
 #: A message that no parachute has.
 FOREIGN_MESSAGE = dialect.MAVLINK_MSG_ID_ATTITUDE
 
@@ -99,21 +111,60 @@ def _requested(bench: MavlinkBench, message_id: int, required: bool) -> Trial:
     return "accepted, and it comes"
 
 
-def _information_texts(bench: MavlinkBench) -> Trial:
+def _information(bench: MavlinkBench) -> Any:
+    """Its last COMPONENT_INFORMATION_BASIC (ReceivedFrame)."""
     kind = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
     yield from bench.command(dialect.MAV_CMD_REQUEST_MESSAGE, kind)
     yield from bench.wait_for("COMPONENT_INFORMATION_BASIC", 0.4)
     told = [one for one in bench.heard if one.kind == "COMPONENT_INFORMATION_BASIC"]
     if not told:
         raise not_supported("it sends no COMPONENT_INFORMATION_BASIC")
-    message = told[-1].message
-    for field in ("vendor_name", "model_name", "software_version", "hardware_version"):
-        text = getattr(message, field)
+    bench.look_at(told[-1:])
+    return told[-1]
+
+
+def _is_readable(told: ReceivedFrame, *fields: str) -> None:
+    for field in fields:
+        text = getattr(told.message, field)
         if not str(text).isprintable():
-            raise failed(f"{field} is {text!r}: need text that can be read", [told[-1].packet])
+            raise failed(f"{field} is {text!r}: need text that can be read", [told.packet])
+
+
+def _information_texts(bench: MavlinkBench) -> Trial:
+    told = yield from _information(bench)
+    _is_readable(told, "vendor_name", "model_name", "software_version", "hardware_version")
+    message = told.message
     if not message.vendor_name or not message.model_name:
-        raise failed("vendor_name and model_name are empty", [told[-1].packet])
+        raise failed("vendor_name and model_name are empty", [told.packet])
     return f"{message.vendor_name}, {message.model_name}, software {message.software_version}"
+
+
+def _information_serial(bench: MavlinkBench) -> Trial:
+    told = yield from _information(bench)
+    _is_readable(told, "serial_number")
+    return told.message.serial_number or "not provided"
+
+
+def _information_date(bench: MavlinkBench) -> Trial:
+    told = yield from _information(bench)
+    date = component_information(told.message).manufacture_date
+    if 0 < told.message.time_manufacture_s < _FIRST_DATE:
+        raise failed(f"time_manufacture_s is {date}, before there was MAVLink", [told.packet])
+    return date or "not provided"
+
+
+def _information_time(bench: MavlinkBench) -> Trial:
+    first = yield from _information(bench)
+    yield from bench.watch_on(_APART)
+    last = yield from _information(bench)
+    if last is first:
+        raise not_tried("the second COMPONENT_INFORMATION_BASIC came too late")
+    passed = last.at - first.at
+    went = (last.message.time_boot_ms - first.message.time_boot_ms) / 1000.0
+    if abs(went - passed) > _CLOCK:
+        both = [first.packet, last.packet]
+        raise failed(f"in {passed:.2f} s its time_boot_ms went on by {went:.2f} s", both)
+    return f"{went:.2f} s in {passed:.2f} s"
 
 
 def _request_unknown(bench: MavlinkBench) -> Trial:
@@ -154,6 +205,21 @@ CLAUSES = (
         "information-texts",
         "COMPONENT_INFORMATION_BASIC names vendor and model in readable text",
         _information_texts,
+    ),
+    _connects(
+        "information-serial",
+        "its serial_number is readable text, or all 0",
+        _information_serial,
+    ),
+    _connects(
+        "information-date",
+        "its time_manufacture_s is a date in s since 1970, or 0",
+        _information_date,
+    ),
+    _connects(
+        "information-time",
+        "its time_boot_ms is the time since its start, ms",
+        _information_time,
     ),
     _connects(
         "request-unknown",

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from itertools import dropwhile
 
-from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_supported, not_tried
+from chute_ros.conformance.clause import (
+    READS,
+    OutOfReach,
+    Risk,
+    Trial,
+    Wait,
+    failed,
+    not_supported,
+    not_tried,
+)
 from chute_ros.links.mavlink.conformance.bench import (
     ARM,
     EVERY,
@@ -182,5 +191,11 @@ CLAUSES = (
         _stays,
         "it is released already",
         Risk.FIRES,
+    ),
+    _reports(
+        "released-otherwise",
+        "released by another source (MANUAL, ATS, GEOFENCE, FTS_PRECHECKING) it names that",
+        OutOfReach("it takes a radio, a fall, a geofence or a flight termination system"),
+        READS,
     ),
 )

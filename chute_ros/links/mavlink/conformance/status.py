@@ -8,6 +8,7 @@ from chute_ros.conformance.clause import (
     ASKS,
     READS,
     DecidedError,
+    OutOfReach,
     Trial,
     failed,
     not_supported,
@@ -205,7 +206,20 @@ def _date(bench: MavlinkBench) -> Trial:
     return told or "not provided"
 
 
+def _altitude(bench: MavlinkBench) -> Trial:
+    """A device that fills in its height instead shows another one now and then."""
+    yield from bench.status()
+    told = yield from _statuses(bench)
+    altitudes = {one.message.ats_arm_altitude: one for one in told}
+    if len(altitudes) > 1:
+        packets = [one.packet for one in altitudes.values()]
+        numbers = ", ".join(map(str, sorted(altitudes)))
+        raise failed(f"nothing set it, and it was {numbers} m", packets)
+    return f"{told[-1].message.ats_arm_altitude} m each time"
+
+
 _told = of(PARACHUTE, "Parachute Status")
+_safe = of(PARACHUTE, "Safety and readiness for deployment")
 _errors = of(PARACHUTE, "Errors")
 CLAUSES = (
     _told("status-rate", "PARACHUTE_STATUS is streamed at nominally 1 Hz", _rate, READS),
@@ -269,6 +283,29 @@ CLAUSES = (
         "GROUND_CLEARED (far enough from the ground) and ON_GROUND are not reported at once",
         _ground,
         READS,
+    ),
+    _errors(
+        "error-reported",
+        "what is wrong with it has its flag in error_status",
+        OutOfReach("the document names no way to cause an error"),
+        READS,
+    ),
+    _safe(
+        "ground-cleared",
+        "GROUND_CLEARED is raised at a safe distance from the ground",
+        OutOfReach("a device on a bench does not climb"),
+        READS,
+    ),
+    _safe(
+        "geofence-mission",
+        "it fetches a geofence by the mission protocol, and then reports GEOFENCE_MISSION_SET",
+        OutOfReach("the kit has no geofence to give, and a device outside of one may release"),
+        READS,
+    ),
+    _told(
+        "arm-altitude",
+        "ats_arm_altitude is the altitude of the ATS, m, which is set: it does not change",
+        _altitude,
     ),
     _told(
         "packed-date",

@@ -229,6 +229,10 @@ def _bits(name: str, bits: int) -> Callable[[BrokenParachute], None]:
     return partial(_says, _STATUS, change)
 
 
+def _its_height(device: BrokenParachute, message: Any) -> None:
+    message.ats_arm_altitude = device.boot_ms() // 1000 % 2
+
+
 def _seconds(_: BrokenParachute, message: Any) -> None:
     message.time_boot_ms //= 1000
 
@@ -376,6 +380,9 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
     "request-status": _wrong(_REQUEST, _of_status),
     "request-information": _late_information,
     "information-texts": _field(_INFORMATION, "_vendor_name_raw", b""),
+    "information-serial": _field(_INFORMATION, "_serial_number_raw", b"\x01\x02"),
+    "information-date": _field(_INFORMATION, "time_manufacture_s", 20_250_615),
+    "information-time": _field(_INFORMATION, "time_boot_ms", 0),
     "request-unknown": _wrong(_REQUEST, _unknown_message),
     "status-rate": partial(_rare, _STATUS),
     "set-interval": _set_without_effect,
@@ -388,6 +395,7 @@ BREAKS: dict[str, Callable[[BrokenParachute], None]] = {
     "deployment-value": partial(_says, _STATUS, _released_at_first),
     "safety-flags": _bits("safety_status", 1 << 3),
     "ground-flags": _bits("safety_status", 0b11),
+    "arm-altitude": partial(_says, _STATUS, _its_height),
     "packed-date": _field(_STATUS, "_parachute_packed_date_raw", b"19.06.2026"),
     **dict.fromkeys(
         (

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, zip_longest
 from typing import Any
 
 from chute_ros.conformance.bench import NotAllowedError, ReceivedPacket, RecordingBench, first_of
@@ -40,7 +41,11 @@ STATUS_WITHIN = 3.0
 DNA, _AWAY = "--dna", 12.0
 #: The option with which a trigger is tried, in place of a controller.
 TRIGGER = "--trigger"
+#: The option with which a controller is fired by TYPE_DEPLOY_FORCE, in place of TYPE_DEPLOY.
+DEPLOY_FORCE = "--deploy-force"
 _FIRES = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE")
+#: The first part of a unique id that nobody has.
+_NOBODYS_ID = b"nobody"
 #: Whether these are set may decide whether it fires.
 _HARMLESS = (p.AUTO_SAVE, p.LIGHT, p.NODE_STATUS_INTERVAL, p.PARACHUTE_STATUS_INTERVAL)
 
@@ -107,6 +112,9 @@ class UpfBench(RecordingBench[TransferPacket]):
         #: Node id of a controller or a trigger -> what is sent to it.
         self._overheard: dict[int, Endpoint] = {}
         self._numbers: dict[tuple[int, str], int] = {}
+        #: A second node that asks, and what is answered to it.
+        self._second: Endpoint | None = None
+        self.to_second: list[TransferPacket] = []
         #: Frames of ours, some of them spoilt, that leave before others.
         self._spoilt: list[bytes] = []
         self._beat_at = self._tell_at = -math.inf
@@ -119,6 +127,7 @@ class UpfBench(RecordingBench[TransferPacket]):
             self._overhear(data, now)
         heard = self._endpoint.receive(data, now)
         if heard is None:
+            self._hear_second(data, now)
             return
         one = self._take(heard, data, now)
         if heard.source == self.node and one.kind == NODE_STATUS:
@@ -139,7 +148,20 @@ class UpfBench(RecordingBench[TransferPacket]):
             if told is not None and told.name == names.TRIGGER_SERVICE:
                 self._take(told, data, now)
 
+    def _hear_second(self, data: bytes, now: float) -> None:
+        heard = None if self._second is None else self._second.receive(data, now)
+        if heard is not None and heard.kind is TransferKind.RESPONSE:
+            self.to_second.append(self._packet(heard, data, now))
+
     def _take(self, heard: ReceivedTransfer, data: bytes, now: float) -> TransferPacket:
+        one = self._packet(heard, data, now)
+        self.every.append(one)
+        if heard.source == self.node:
+            self.heard.append(one)
+            self.heard_at = now
+        return one
+
+    def _packet(self, heard: ReceivedTransfer, data: bytes, now: float) -> TransferPacket:
         text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
         label = (
             heard.name
@@ -147,12 +169,7 @@ class UpfBench(RecordingBench[TransferPacket]):
             else f"{heard.name} {heard.kind.value}"
         )
         packet = self.noted(False, f"node {heard.source}", label, text, data)
-        one = TransferPacket(now, heard.name, packet, heard)
-        self.every.append(one)
-        if heard.source == self.node:
-            self.heard.append(one)
-            self.heard_at = now
-        return one
+        return TransferPacket(now, heard.name, packet, heard)
 
     def stream_ended(self, stream: Hashable) -> None:
         pass
@@ -233,15 +250,33 @@ class UpfBench(RecordingBench[TransferPacket]):
         self._spoilt += [*whole, *spoils(self._endpoint.take_output())]
 
     def _response(self, server: int, service: str, number: int) -> Any:
-        def answers(one: TransferPacket) -> bool:
-            heard = one.transfer
-            told = heard.kind, heard.source, heard.name, heard.transfer_id
-            return told == (TransferKind.RESPONSE, server, service, number)
-
-        found = first_of(self.every, len(self.every), answers)
+        found = _answer_in(self.every, server, service, number)
         yield Wait(self.now + ANSWER, found)
         answer = found()
         return None if answer is None else answer.values
+
+    def get_twice(self, first: str, second: str) -> Any:
+        """The responses of GetSet (their values) to us and to a second node, each for its name;
+        None: none came. The frames of the two requests alternate, and both have one number."""
+        service, asked = bus_requests.GET_SET, (first, second)
+        if self._second is None:
+            self._second = Endpoint(self.definitions.types, self.nobody())
+        number, whole = self._next_number(self.node, service), self._endpoint.take_output()
+        frames = []
+        for endpoint, who, name in zip(
+            (self._endpoint, self._second), ("us", "a second node"), asked, strict=True
+        ):
+            values = {"index": 0, "value": {"empty": {}}, "name": name.encode()}
+            text = ", ".join(f"{key}={value}" for key, value in values.items())
+            self.noted(True, who, f"{service} request to node {self.node}", text, b"")
+            endpoint.request(self.node, service, number, values, 16)
+            frames.append(endpoint.take_output())
+        alternating = chain.from_iterable(zip_longest(*frames))
+        self._spoilt += [*whole, *(one for one in alternating if one is not None)]
+        ours = _answer_in(self.every, self.node, service, number)
+        its = _answer_in(self.to_second, self.node, service, number)
+        yield Wait(self.now + ANSWER, lambda: ours() and its())
+        return [None if one is None else one.values for one in (ours(), its())]
 
     def _check(self, service: str, values: Mapping[str, Any]) -> None:
         """Nothing leaves that is not allowed."""
@@ -308,6 +343,14 @@ class UpfBench(RecordingBench[TransferPacket]):
         """The nodes of other devices of its kind."""
         told = (one for one in self.every if one.kind == self.device.status)
         return {one.transfer.source for one in told} - self._ids
+
+    def ask_for_node_id(self) -> None:
+        """As a node without one, with the first part of a unique id that nobody has."""
+        anonymous = Endpoint(self.definitions.types, 0)
+        values = {"first_part_of_unique_id": True, "unique_id": _NOBODYS_ID}
+        self.noted(True, "a node without a node id", ALLOCATION, _NOBODYS_ID.hex(), b"")
+        anonymous.broadcast(ALLOCATION, values)
+        self._spoilt += anonymous.take_output()
 
     def nobody(self) -> int:
         """A node id that nobody on the bus has."""
@@ -496,6 +539,19 @@ class UpfBench(RecordingBench[TransferPacket]):
         if self.device.up:
             return (yield from self.reaches(ParachuteState[self.device.up], within))
         return (yield from self.wait_for(self.device.status, within)) is not None
+
+
+def _answer_in(
+    heard: Sequence[TransferPacket], server: int, service: str, number: int
+) -> Callable[[], TransferPacket | None]:
+    """The first response from now on to the request of this number."""
+
+    def answers(one: TransferPacket) -> bool:
+        told = one.transfer
+        is_from = told.kind, told.source, told.name, told.transfer_id
+        return is_from == (TransferKind.RESPONSE, server, service, number)
+
+    return first_of(heard, len(heard), answers)
 
 
 def _node_of(one: TransferPacket | None) -> int:

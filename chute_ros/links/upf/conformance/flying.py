@@ -4,11 +4,25 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import pairwise
 
 from chute_ros.conformance.bench import first_of
-from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import TransferPacket, UpfBench
-from chute_ros.links.upf.conformance.standard import READY_WITHIN, UpfClause, clause
+from chute_ros.conformance.clause import (
+    READS,
+    OutOfReach,
+    Risk,
+    Trial,
+    Wait,
+    failed,
+    not_tried,
+)
+from chute_ros.links.upf.conformance.bench import DEPLOY_FORCE, TransferPacket, UpfBench
+from chute_ros.links.upf.conformance.standard import (
+    READY_WITHIN,
+    UNDER_WAY,
+    UpfClause,
+    clause,
+)
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.machine import DEPLOYED, REST_TIME
@@ -27,6 +41,27 @@ _WAITS = 3.0
 #: At rest for 5 s, and a while to tell.
 _RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
 _UNKNOWN_TYPE = 200
+#: Of a switch, neither on nor off.
+_NO_SWITCH = 2
+#: The switch of the resistor is left alone: another resistor may disturb the bus.
+_SWITCHES = tuple(
+    one.name for one in p.PARAMETERS if one.kind is bool and one.name != p.CANBUS_RESISTER
+)
+
+
+def _switch_range(bench: UpfBench) -> Trial:
+    became = set()
+    for name in _SWITCHES:
+        if p.as_switch((yield from bench.value(name))) is None:
+            # Which is another clause's matter.
+            continue
+        told = yield from bench.set(name, _NO_SWITCH)
+        yield from bench.put_back(name)
+        if told not in (False, True):
+            what = p.words(told) or "not reported"
+            raise failed(f"{name} is a switch; it was set to {_NO_SWITCH}, and is {what}")
+        became.add("on" if told else "off")
+    return f"each set to {_NO_SWITCH}, and {' or '.join(sorted(became))}"
 
 
 def _bad_magic(bench: UpfBench) -> Trial:
@@ -186,7 +221,7 @@ def _tells_launched(bench: UpfBench, one: TransferPacket) -> bool:
     return bench.state_in(one) is _S.LAUNCHED
 
 
-def _deploy(bench: UpfBench) -> Trial:
+def _deploys(bench: UpfBench, request: str) -> Trial:
     """In the air and armed. Without its APS it is for TYPE_DEPLOY* alone to fire it."""
     yield from _by_hand(bench)
     yield from bench.set(p.ENABLE_PARACHUTE, True)
@@ -194,11 +229,11 @@ def _deploy(bench: UpfBench) -> Trial:
     yield from bench.set(p.ENABLE_APS, False)
     began = bench.now
     bench.deployed_from = len(bench.every)
-    result = yield from bench.ask("TYPE_DEPLOY")
+    result = yield from bench.ask(request)
     if result != "SUCCESS":
         bench.deployed_from = -1
         answer = result or "not answered"
-        raise failed(f"it was ARMED, {p.ENABLE_APS} is off, and TYPE_DEPLOY: {answer}")
+        raise failed(f"it was ARMED, {p.ENABLE_APS} is off, and {request}: {answer}")
 
     out = first_of(bench.every, bench.deployed_from, partial(_tells_launched, bench))
     yield Wait(began + FIRES_WITHIN, out)
@@ -270,9 +305,54 @@ def _touchdown(bench: UpfBench) -> Trial:
     return f"{passed:.1f} s after LAUNCHED"
 
 
+def _blocks_when_abnormal(bench: UpfBench) -> Trial:
+    """The document names no fault, so that none is caused here. All that was received counts."""
+    yield from bench.watch_on(UNDER_WAY)
+    asked = [
+        one
+        for one in bench.heard
+        if one.kind == names.VEHICLE_SERVICE
+        and bench.definitions.type_name(one.kind, one.values) == "TYPE_FLIGHT_BLOCK"
+    ]
+    statuses = [one for one in bench.heard if one.kind == names.PARACHUTE_STATUS]
+    became = [
+        (before, after)
+        for before, after in pairwise(statuses)
+        if bench.state_in(after) is _S.ABNORMAL is not bench.state_in(before)
+    ]
+    if not became:
+        raise not_tried("it did not become ABNORMAL: cause a fault while the kit listens")
+    for before, after in became:
+        first, last = before.at - UNDER_WAY, after.at + UNDER_WAY
+        its = [one for one in asked if first <= one.at <= last]
+        if not its:
+            raise failed("it became ABNORMAL without TYPE_FLIGHT_BLOCK", [after.packet])
+        bench.look_at([after, its[0]])
+    return f"asked each time it became ABNORMAL ({len(became)})"
+
+
 _STATES, _PARAMETERS = "Global working state", "Parameters"
 _SERVICE = "ParachuteService"
+_NO_FLIGHT = "the document names no condition, and a device on a bench does not fly"
+_NO_FALL = "a device on a bench does not fall"
+
+
+def _by_itself(parameter: str, before: ParachuteState, to: ParachuteState) -> UpfClause:
+    """What it does while this is on."""
+    name = parameter.removeprefix("Enable ").lower()
+    text = f"{before.name}, and {parameter} is on: it becomes {to.name} by itself"
+    return clause(_PARAMETERS, name, text, OutOfReach(_NO_FLIGHT), READS)
+
+
 CLAUSES: tuple[UpfClause, ...] = (
+    clause(
+        _PARAMETERS,
+        "switch-range",
+        "a switch is on or off: another number is refused, or counts as one of them",
+        _switch_range,
+        "its switches are set to what is neither, and set back",
+        Risk.ARMS,
+    ),
     clause(
         _SERVICE, "bad-magic", "a wrong magic number is refused", _bad_magic, _MOVES, Risk.ARMS
     ),
@@ -304,9 +384,18 @@ CLAUSES: tuple[UpfClause, ...] = (
     ),
     clause(
         _STATES,
+        "deploy-force",
+        "TYPE_DEPLOY_FORCE: LAUNCHED, also with Enable APS off",
+        partial(_deploys, request="TYPE_DEPLOY_FORCE"),
+        "IT FIRES",
+        Risk.FIRES,
+        DEPLOY_FORCE,
+    ),
+    clause(
+        _STATES,
         "deploy",
         "TYPE_DEPLOY: LAUNCHED, also with Enable APS off",
-        _deploy,
+        partial(_deploys, request="TYPE_DEPLOY"),
         "IT FIRES",
         Risk.FIRES,
     ),
@@ -333,5 +422,30 @@ CLAUSES: tuple[UpfClause, ...] = (
         _touchdown,
         "it has fired",
         Risk.FIRES,
+    ),
+    clause(
+        _STATES,
+        "block-when-abnormal",
+        "as it becomes ABNORMAL, which is a fault, it asks the vehicle for TYPE_FLIGHT_BLOCK",
+        _blocks_when_abnormal,
+        READS,
+    ),
+    _by_itself(p.AUTO_TAKEOFF, _S.READY, _S.TAKEOFF),
+    _by_itself(p.AUTO_ARM, _S.TAKEOFF, _S.ARMED),
+    _by_itself(p.AUTO_DISARM, _S.ARMED, _S.TAKEOFF),
+    _by_itself(p.AUTO_LAND, _S.TAKEOFF, _S.READY),
+    clause(
+        _STATES,
+        "aps",
+        "ARMED, and its APS detects an accident: it deploys by itself",
+        OutOfReach(_NO_FALL),
+        READS,
+    ),
+    clause(
+        _PARAMETERS,
+        "no-aps",
+        "with Enable APS off it never deploys by itself",
+        OutOfReach(_NO_FALL),
+        READS,
     ),
 )

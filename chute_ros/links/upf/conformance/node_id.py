@@ -11,10 +11,14 @@ from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID
 
 _DOES = "its static node id is 0 for a while; it restarts twice, and is set back"
+_SETS = "its static node id is set to what is none, and set back"
 #: A device asks each 0.6 to 1 s, three parts one after the other, and then starts to tell, s.
 _COMES_WITHIN, _ASKS_WITHIN = 15.0, 5.0
+#: An allocator answers within this, s (FOLLOWUP_TIMEOUT is half of it).
+_ALLOCATES_WITHIN = 1.0
 
 
 def _unique_id(bench: UpfBench) -> Any:
@@ -68,6 +72,27 @@ def _forgets(bench: UpfBench) -> Trial:
     return "after a restart it asks again"
 
 
+def _range(bench: UpfBench) -> Trial:
+    name = p.STATIC_NODE_ID
+    for wrong in (-1, HIGHEST_NODE_ID + 1):
+        told = yield from bench.set(name, wrong)
+        yield from bench.put_back(name)
+        if told is None:
+            raise failed(f"{name} is set to {wrong}, and is not reported")
+        if told == wrong:
+            raise failed(f"{name} takes {wrong} (need 0 to {HIGHEST_NODE_ID})")
+    return f"it takes neither -1 nor {HIGHEST_NODE_ID + 1}"
+
+
+def _client(bench: UpfBench) -> Trial:
+    since = len(bench.heard)
+    bench.ask_for_node_id()
+    yield from bench.watch_on(_ALLOCATES_WITHIN)
+    if answers := [one.packet for one in bench.heard[since:] if one.kind == ALLOCATION]:
+        raise failed("it answers a node that asks for a node id, as an allocator", answers)
+    return "it answers no node that asks for a node id"
+
+
 _NODE = "Node discovery"
 CLAUSES: tuple[UpfClause, ...] = (
     clause(
@@ -87,5 +112,14 @@ CLAUSES: tuple[UpfClause, ...] = (
         _DOES,
         needs=DNA,
         restarts=True,
+    ),
+    clause(_NODE, "node-id-range", "what is no node id is refused", _range, _SETS, needs=DNA),
+    clause(
+        _NODE,
+        "dna-client",
+        "it only asks for node ids, and gives none out",
+        _client,
+        "a node without a node id asks on its bus",
+        needs=DNA,
     ),
 )

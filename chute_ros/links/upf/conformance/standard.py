@@ -13,6 +13,7 @@ from chute_ros.conformance.clause import (
     SOAK,
     Clause,
     DecidedError,
+    OutOfReach,
     Trial,
     Wait,
     failed,
@@ -39,11 +40,13 @@ _SETS, _RESTARTS = "a parameter is changed, and set back", "it restarts"
 _SETS_AND_RESTARTS = f"{_SETS}; it may be restarted for that"
 #: An interval may be off by this share, and this much, s.
 _SHARE, _LEAST = 0.25, 0.02
+#: What no interval can be, ms: less than none, and more than DroneCAN's second for a NodeStatus.
+_BELOW, _ABOVE = -5, 10**9
 #: Set for a trial, ms.
 _NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
 _UNKNOWN = "No Such Parameter"
 #: State and request, which one change makes, are at most so far apart, s.
-_UNDER_WAY = 0.3
+UNDER_WAY = 0.3
 #: It is ready so long after a restart at the latest, s.
 READY_WITHIN = 15.0
 #: Microseconds since 1970.
@@ -222,6 +225,20 @@ def _resistor(bench: UpfBench) -> Trial:
     return "off"
 
 
+def _light(bench: UpfBench) -> Trial:
+    name = p.LIGHT
+    before = p.as_switch((yield from bench.value(name)))
+    if before is None:
+        raise not_tried(f"{name} is not reported as a switch")
+    for wanted in (not before, before):
+        if (told := (yield from bench.set(name, wanted))) is not wanted:
+            yield from bench.put_back(name)
+            what = p.words(told) or "not reported"
+            raise failed(f"{name} was set to {p.words(wanted)}, and is {what}")
+    yield from bench.put_back(name)
+    return "off and on; nothing on the bus shows the light itself"
+
+
 def _set_node_interval(bench: UpfBench) -> Trial:
     return (yield from _set_interval(bench, p.NODE_STATUS_INTERVAL, _NODE_INTERVAL, NODE_STATUS))
 
@@ -262,15 +279,24 @@ def _comes_each(bench: UpfBench, kind: str, seconds: float) -> bool:
 
 
 def _range(bench: UpfBench) -> Trial:
+    """The document has no longest interval of a ParachuteStatus; a device may have one."""
+    node = yield from _refuses(bench, p.NODE_STATUS_INTERVAL, _BELOW, _ABOVE)
+    name = p.PARACHUTE_STATUS_INTERVAL
+    answer = yield from bench.get(name)
+    most = None if answer is None else p.value_of(answer["max_value"])
+    above = [most + 1] if isinstance(most, int) and 0 < most < _ABOVE else []
+    return f"{node}; {(yield from _refuses(bench, name, _BELOW, *above))}"
+
+
+def _refuses(bench: UpfBench, name: str, *wrongs: int) -> Trial:
     """A device may keep what it has, or take the nearest that can be."""
-    name = p.NODE_STATUS_INTERVAL
     answer = yield from bench.get(name)
     before = None if answer is None else p.value_of(answer["value"])
     if before is None:
         raise failed(f"{name} is not reported")
     low, high = p.value_of(answer["min_value"]), p.value_of(answer["max_value"])
     became = []
-    for wrong in (-5, 10**9):
+    for wrong in wrongs:
         told = yield from bench.set(name, wrong)
         yield from bench.put_back(name)
         if told == wrong:
@@ -280,7 +306,7 @@ def _range(bench: UpfBench) -> Trial:
                 f"{name} was set to {wrong}, and {before} became {p.words(told) or 'not reported'}"
             )
         became.append(p.words(told))
-    return f"{name} set to -5 and 1000000000 is {' and '.join(became)}"
+    return f"{name} set to {' and '.join(map(str, wrongs))} is {' and '.join(became)}"
 
 
 def _within(value: p.Value | None, low: p.Value | None, high: p.Value | None) -> bool:
@@ -341,13 +367,13 @@ def _releases_when_ready(bench: UpfBench) -> Trial:
             starting = starting or state is ParachuteState.NOT_READY
             if state is ParachuteState.READY and starting:
                 is_ready = min(is_ready, one.at)
-            if state is ParachuteState.NOT_READY and one.at > released + _UNDER_WAY:
+            if state is ParachuteState.NOT_READY and one.at > released + UNDER_WAY:
                 raise failed("it released the block, and is still NOT_READY", [one.packet])
         elif one.kind == names.VEHICLE_SERVICE and starting:
             asked = bench.definitions.type_name(one.kind, one.values)
             if asked == "TYPE_FLIGHT_BLOCK_RELEASE":
                 released = min(released, one.at)
-            elif asked == "TYPE_FLIGHT_BLOCK" and one.at > is_ready + _UNDER_WAY:
+            elif asked == "TYPE_FLIGHT_BLOCK" and one.at > is_ready + UNDER_WAY:
                 raise failed(f"it is READY, and asks for {asked}", [one.packet])
     return text
 
@@ -476,7 +502,22 @@ CLAUSES: tuple[UpfClause, ...] = (
         restarts=True,
     ),
     clause(_PARAMETERS, "parameter-range", "what cannot be is refused", _range, _SETS),
+    clause(_PARAMETERS, "light", "Enable Light can be switched off and on", _light, _SETS),
+    clause(
+        _PARAMETERS,
+        "resister",
+        "Enable CANBUS resister connects the 120 ohm of the bus",
+        OutOfReach("no message shows the resistor, and switching it may disturb the bus"),
+        READS,
+    ),
     clause(_STANDARD, "opcode-save", "ExecuteOpcode saves", _opcode, "it saves its parameters"),
+    clause(
+        _STANDARD,
+        "opcode-erase",
+        "ExecuteOpcode erases: its parameters are as delivered",
+        OutOfReach("the owner's settings would be lost"),
+        READS,
+    ),
     clause(
         _STANDARD,
         "restart-magic",

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from chute_ros.conformance.clause import Trial, failed, not_tried
-from chute_ros.links.upf.conformance.bench import ANSWER, UpfBench
+from chute_ros.links.upf.conformance.bench import ANSWER, TRIES, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
@@ -91,6 +91,22 @@ def _other_node(bench: UpfBench) -> Trial:
     return f"a request to node {other} is not answered"
 
 
+def _two_senders(bench: UpfBench) -> Trial:
+    asked = bench.device.parameters[0], bench.device.parameters[-1]
+    for _ in range(TRIES):
+        answers = yield from bench.get_twice(*asked)
+        if None not in answers:
+            break
+    else:
+        raise failed(f"two nodes ask at once, and not both are answered, {TRIES} times")
+    for name, answer in zip(asked, answers, strict=True):
+        told = bytes(answer["name"]).decode("utf-8", "replace")
+        # It need not have the parameter.
+        if told not in (name, ""):
+            raise failed(f"two nodes ask at once, and {name} is answered with {told}")
+    return "each is answered"
+
+
 def _clause(
     name: str,
     text: str,
@@ -137,5 +153,12 @@ CLAUSES: tuple[UpfClause, ...] = (
     ),
     UpfClause(
         _DOCUMENT, _SECTION, "other-node", "a request to another node is not its own", _other_node
+    ),
+    UpfClause(
+        _DOCUMENT,
+        _SECTION,
+        "two-senders",
+        "several nodes may ask at once, and each is answered",
+        _two_senders,
     ),
 )

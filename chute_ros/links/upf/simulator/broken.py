@@ -23,6 +23,7 @@ from chute_ros.links.upf.simulator.trigger import (
     UpfTrigger,
 )
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 from chute_ros.protocol.dronecan.transfer import TransferKind, head_of
@@ -47,6 +48,8 @@ _ANSWERS = {
     "TYPE_DISARM": "disarm",
     "TYPE_LAND": "land",
 }
+#: Request -> the clause that it breaks as it says SUCCESS to it and does not fire.
+_DEPLOYS = {"TYPE_DEPLOY": "deploy", "TYPE_DEPLOY_FORCE": "deploy-force"}
 #: The state that it leaves by itself though this is off, and how.
 _BY_ITSELF = {
     "no-auto-takeoff": (_S.READY, p.AUTO_TAKEOFF, ControllerEvent.TAKEOFF),
@@ -66,6 +69,8 @@ class BrokenNode(UpfNode):
     """Wrong as a node on the bus. breaks: the name of a clause, of a trigger without trigger-."""
 
     _first_start, _dumb_until = math.nan, -math.inf
+    #: Who asked first; 0: nobody has.
+    _client = 0
 
     def __init__(self, definitions: Definitions, settings: Any, breaks: str) -> None:
         self.breaks = breaks
@@ -100,6 +105,16 @@ class BrokenNode(UpfNode):
             self.endpoint.node_id -= 1
         if self.breaks in WIRE_BREAKS and self._spoilt.observe(data, self.node_id) == self.breaks:
             self._is_wrong_about_it(now)
+
+    def _allocation(self, source: int, values: Mapping[str, Any]) -> None:
+        if self.breaks == "dna-client" and not source:
+            self.broadcast(ALLOCATION, {"unique_id": values["unique_id"]})
+        super()._allocation(source, values)
+
+    def _serve(self, request: ReceivedTransfer) -> None:
+        self._client = self._client or request.source
+        if self.breaks != "two-senders" or request.source == self._client:
+            super()._serve(request)
 
     def _is_wrong_about_it(self, now: float) -> None:
         """It carries out what has a wrong CRC; all else makes it silent for a while."""
@@ -159,7 +174,7 @@ class BrokenController(BrokenNode, UpfController):
             self._enter(_S.ARMED)
             return "SUCCESS"
         disabled = not self.switch(p.ENABLE_PARACHUTE)
-        if name == "TYPE_DEPLOY" and self.breaks == "deploy" and not disabled:
+        if self.breaks == _DEPLOYS.get(name) and not disabled:
             return "SUCCESS"
         if name == "TYPE_DEPLOY_FORCE" and self.breaks == "disabled" and disabled:
             self._fire(self.now)
@@ -181,6 +196,8 @@ class BrokenController(BrokenNode, UpfController):
 
     def _ask_vehicle(self, type_name: str) -> int:
         if _NOT_ASKED.get(self.breaks) == type_name:
+            return 0
+        if self.breaks == "block-when-abnormal" and self.state is _S.ABNORMAL:
             return 0
         return super()._ask_vehicle(type_name)
 
@@ -293,12 +310,25 @@ def _any_name(device: BrokenNode, request: ReceivedTransfer, answer: Any) -> Ans
     return answer if known else device.memory.answer(p.LIGHT)
 
 
-def _takes_all(device: BrokenController, request: ReceivedTransfer, answer: Any) -> Answer:
-    wanted, told = p.value_of(request.values["value"]), dict(answer)
-    if wanted is not None and told:
-        device.memory.values[_named(request)] = wanted
-        told["value"] = p.union_of(wanted)
-    return told
+def _takes_all(*named: str) -> Callable[[BrokenNode], None]:
+    """Any value of these parameters."""
+
+    def change(device: BrokenNode, request: ReceivedTransfer, answer: Any) -> Answer:
+        wanted, told = p.value_of(request.values["value"]), dict(answer)
+        if wanted is not None and told and _named(request) in named:
+            device.memory.values[_named(request)] = wanted
+            told["value"] = p.union_of(wanted)
+        return told
+
+    return _answers(bus_requests.GET_SET, change)
+
+
+def _keeps_light(device: BrokenController, request: ReceivedTransfer, answer: Any) -> Answer:
+    """On, whatever it is set to."""
+    if _named(request) != p.LIGHT:
+        return dict(answer)
+    device.memory.values[p.LIGHT] = True
+    return device.memory.answer(p.LIGHT)
 
 
 def _always_saves(device: BrokenController) -> None:
@@ -384,6 +414,7 @@ _NODE_CHANGES: dict[str, Callable[[BrokenNode], None]] = {
     "opcode-save": _answers(bus_requests.EXECUTE_OPCODE, lambda *_: {"ok": False}),
     "restart-magic": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": True}),
     "restart": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": False}),
+    "node-id-range": _takes_all(p.STATIC_NODE_ID),
 }
 _CONTROLLER_CHANGES: dict[str, Callable[[BrokenController], None]] = {
     "status-interval": _interval(
@@ -396,7 +427,9 @@ _CONTROLLER_CHANGES: dict[str, Callable[[BrokenController], None]] = {
     "resister-off": _parameter(p.CANBUS_RESISTER, default_value=p.union_of(True)),
     "node-interval": _interval(NODE_STATUS, lambda device: 1.0),
     "parachute-interval": _interval(names.PARACHUTE_STATUS, lambda device: 0.1),
-    "parameter-range": _answers(bus_requests.GET_SET, _takes_all),
+    "parameter-range": _takes_all(p.NODE_STATUS_INTERVAL, p.PARACHUTE_STATUS_INTERVAL),
+    "switch-range": _takes_all(*(one.name for one in p.PARAMETERS if one.kind is bool)),
+    "light": _answers(bus_requests.GET_SET, _keeps_light),
     "auto-save": _always_saves,
     "bad-magic": _any_magic(names.PARACHUTE_SERVICE),
 }
@@ -416,7 +449,10 @@ _TRIGGER_CHANGES: dict[str, Callable[[BrokenTrigger], None]] = {
     "trigger-is-launched": _tells(names.TRIGGER_STATUS, is_launched=False),
 }
 #: Breaks of any node that have no entry above.
-_NODE_BREAKS = ("time-sync", "soak", "other-node", "dna", "dna-forgets", *WIRE_BREAKS)
+_NODE_BREAKS = (
+    *("time-sync", "soak", "other-node", "two-senders", "dna", "dna-forgets", "dna-client"),
+    *WIRE_BREAKS,
+)
 #: Clauses that a device can break.
 BREAKS = (
     *_NODE_CHANGES,
@@ -425,8 +461,8 @@ BREAKS = (
     *_NOT_ASKED,
     *_ANSWERS.values(),
     *(f"exclude-{name}" for name in _ANSWERS.values()),
-    *("unknown-type", *_BY_ITSELF, "arm-order", "disabled", "deploy", "touchdown"),
-    "launched-after-trigger",
+    *("unknown-type", *_BY_ITSELF, "arm-order", "disabled", *_DEPLOYS.values(), "touchdown"),
+    *("launched-after-trigger", "block-when-abnormal"),
     *(f"{_TRIGGER}{name}" for name in (*_NODE_CHANGES, *_NODE_BREAKS, "node-id")),
     *_TRIGGER_CHANGES,
 )

@@ -125,10 +125,7 @@ class UpfNode(Actor):
         elif heard.kind is TransferKind.REQUEST:
             self._serve(heard)
         elif heard.name == ALLOCATION:
-            self._dna.heard(heard.source, heard.values, now)
-            if self._dna.node_id and not self.node_id:
-                self.endpoint.node_id = self._dna.node_id
-                self.say(f"was given node id {self.node_id}")
+            self._allocation(heard.source, heard.values)
         elif heard.name == time_sync.MESSAGE:
             stamp = heard.values["previous_transmission_timestamp_usec"]
             self.clock.heard(heard.source, heard.transfer_id, stamp, now)
@@ -245,6 +242,12 @@ class UpfNode(Actor):
             if request.name == bus_requests.RESTART_NODE and answer["ok"]:
                 self._last_words += self.endpoint.take_output()
                 self.reboot()
+
+    def _allocation(self, source: int, values: Mapping[str, Any]) -> None:
+        self._dna.heard(source, values, self.now)
+        if self._dna.node_id and not self.node_id:
+            self.endpoint.node_id = self._dna.node_id
+            self.say(f"was given node id {self.node_id}")
 
     def _interval(self, name: str) -> float:
         return float(self.values[name]) / 1000.0

@@ -24,12 +24,13 @@ WIRE_BREAKS = (
 
 
 class SpoiltRequests:
-    """Follows the frames on a bus, of one sender."""
+    """Follows the frames on a bus, each sender's by themselves."""
 
     def __init__(self, types: DataTypes) -> None:
         self._types = types
-        #: Of a request of several frames: what has come so far, and what came of the last one.
-        self._frames: list[CanFrame] = []
+        #: Of a request of several frames: what has come so far of each sender, and what came of
+        #: the last one.
+        self._under_way: dict[int, list[CanFrame]] = {}
         self._ended: list[CanFrame] = []
 
     def observe(self, data: bytes, node: int) -> str:
@@ -43,7 +44,7 @@ class SpoiltRequests:
             known = self._types.by_id(head.type_id, head.kind.value)
             return "" if known else "foreign-frames"
         to_it = head.kind is TransferKind.REQUEST and head.destination == node
-        return self._follow(frame, frame.data[-1]) if to_it else ""
+        return self._follow(head.source, frame, frame.data[-1]) if to_it else ""
 
     def mended(self) -> list[CanFrame]:
         """The frames of the last request of several, with the right CRC."""
@@ -53,17 +54,17 @@ class SpoiltRequests:
         payload = b"".join(one.data[:-1] for one in self._ended)[2:]
         return frames_of(replace(head, payload=payload), data_type.base_crc)
 
-    def _follow(self, frame: CanFrame, tail: int) -> str:
-        if tail & START and self._frames != [frame]:
-            cut = bool(self._frames)
-            self._frames = [] if tail & END else [frame]
-            return "cut-transfer" if cut else ""
-        if not self._frames:
+    def _follow(self, source: int, frame: CanFrame, tail: int) -> str:
+        frames = self._under_way.get(source, [])
+        if tail & START and frames != [frame]:
+            self._under_way[source] = [] if tail & END else [frame]
+            return "cut-transfer" if frames else ""
+        if not frames:
             return ""
-        self._frames.append(frame)
+        frames.append(frame)
         if not tail & END:
             return ""
-        self._ended, self._frames = self._frames, []
+        self._ended, self._under_way[source] = frames, []
         if any(one == other for one, other in pairwise(self._ended)):
             return "doubled-frames"
         toggles = [one.data[-1] & TOGGLE for one in self._ended]
