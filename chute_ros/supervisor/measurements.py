@@ -57,6 +57,7 @@ STANDARD_LIMITS: dict[str, Limits] = {
 }
 
 HEIGHT, VERTICAL_SPEED = "height", "vertical_speed"
+SINK_BEYOND_TARGET = "sink_beyond_target"
 #: What tells of a fall whichever way up it is.
 FALL_SIGNS = ("vertical_speed", "acceleration")
 PRESSURE_ALTITUDE, ACCELERATION, TILT = "pressure_altitude", "acceleration", "tilt_deg"

@@ -27,6 +27,7 @@ from chute_ros.supervisor.measurements import (
     FORCE_ERROR,
     HEIGHT,
     PRESSURE_ALTITUDE,
+    SINK_BEYOND_TARGET,
     SPEED_ERROR,
     VERTICAL_ACCELERATION,
     VERTICAL_SPEED,
@@ -67,6 +68,10 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
         return felt, why or ("too little was reported lately" if math.isnan(felt) else "")
     if name in _ERRORS:
         return _error(config, state, name, now)
+    if name == SINK_BEYOND_TARGET and state.measured(VERTICAL_SPEED).doubt(VERTICAL_SPEED, now):
+        beyond = _sink_beyond_target(config, state, now)
+        if not math.isnan(beyond):
+            return beyond, ""
     known = state.measured(name)
     why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
@@ -90,6 +95,16 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     if PARTS.get(name, name) in state.heard.disputed:
         return "another source reported otherwise"
     return state.measured(name).doubt(name, now)
+
+
+def _sink_beyond_target(config: SupervisorConfig, state: State, now: float) -> float:
+    """By the heights of the estimator and of the barometer, whichever sinks less, m/s: a speed
+    that is noise hides no sink that both tell. NaN: one of them, or the command, is not known."""
+    last, limits = state.heard.commanded_speed, config.profile.limits[SINK_BEYOND_TARGET]
+    if not now - last.measured_at <= limits.max_age:
+        return math.nan
+    rates = climb_rate(config, state, now), pressure_rate(config, state, now)
+    return math.nan if math.isnan(sum(rates)) else last.value - max(rates)
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:

@@ -24,6 +24,7 @@ from chute_ros.supervisor.measurements import (
     DEGREES,
     HEIGHT,
     PRESSURE_ALTITUDE,
+    SINK_BEYOND_TARGET,
     TILT,
     VERTICAL_SPEED,
 )
@@ -176,17 +177,19 @@ def _note_contradictions(turn: Turn) -> None:
         denied = {**denied, HEIGHT: why}
     tilt, error, beyond, rate = (
         readings.measured(turn.config, state, name, now)
-        for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
+        for name in (TILT, "attitude_error", SINK_BEYOND_TARGET, CLIMB_RATE)
     )
     # An estimator that is wrong follows its command where the vehicle does not.
-    speed = readings.measured(turn.config, state, VERTICAL_SPEED, now)
-    climb_beyond = beyond + speed - rate
+    target = state.heard.vehicle.target_vertical_speed
+    target = 0.0 if math.isnan(target) else target  # it is lower than it was commanded
+    climb_beyond = math.nan if math.isnan(beyond) else target - rate
     since = {name: state.heard.denied_since.get(name, now) for name in denied}
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
     off = state.heard.vehicle.armed is Armed.DISARMED
     told = {} if off else commanded(tilt, error, beyond, climb_beyond)
     last_command = Sample(math.nan, math.nan) if off else _last_command(turn)
     if math.isnan(beyond):
+        speed = readings.measured(turn.config, state, VERTICAL_SPEED, now)
         told = {**told, **commanded_last(last_command.value, speed, rate)}
     turn.heard = replace(
         turn.heard,

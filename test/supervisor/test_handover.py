@@ -23,7 +23,7 @@ from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.measured import Measured, Sample
 from chute_ros.supervisor.pending import Ask, Pending, Time
 from chute_ros.supervisor.state import (
     Alarms,
@@ -252,6 +252,7 @@ def leader(clock: float) -> State:
             at_ground_since=clock - 0.5,
             still_since=clock - 0.5,
             rests_since=clock - 0.5,
+            commanded_speed=Sample(-1.0, clock - 0.5),
             faults_told=("slow",),
         ),
         released_since_reset=frozenset({("upf_can", "34")}),
@@ -312,6 +313,7 @@ OWN: dict[str, Any] = {
     "denied": frozen(vertical_speed="why"),
     "denied_since": frozen(vertical_speed=HERE - 0.5),
     "commanded": frozen(vertical_speed="why"),
+    "commanded_speed": Sample(-2.0, HERE - 0.125),
     "unfit": frozen(acceleration="99"),
     "fitness_since": frozen(acceleration=HERE - 0.125),
     "still_since": HERE - 1.0,

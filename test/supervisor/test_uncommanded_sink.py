@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 
 import pytest
@@ -204,6 +205,25 @@ def test_a_commanded_one_is_none() -> None:
         speed, tilt = max(-5.0, -0.45 * k), min(65.0, 12.0 * k)
         story.fly(story.t + 0.05, tilt=tilt, vertical_speed=speed, attitude_error=4.0)
     assert story.fired() == []
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("target", [0.0, -9.0])
+def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(
+    profile: str, target: float
+) -> None:
+    story, height, chance = Story(shipped(profile)).ready(), 110.0, random.Random(7)
+    for k in range(80):
+        height -= 0.9 * (k >= 30)
+        speed = 0.1 * (k % 2) if k < 30 else chance.uniform(-25.0, 10.0)
+        parts = {"height": height, "vertical_speed": speed, "target_vertical_speed": target}
+        parts["pressure"] = pressure_at(height + 0.1 * (k % 3))
+        force = 9.8 + 0.1 * (k % 3)
+        story.at(story.t + EVERY, story.heartbeat(), story.told(acceleration=force, **parts))
+    if target:
+        assert story.fired() == []
+    else:
+        assert story.newest(Action.KILL).rule == "uncommanded sink"
 
 
 # -- the last command of an autopilot that falls silent ------------------------------------------
