@@ -11,10 +11,10 @@ from chute_ros.sim.flight import GRAVITY
 
 #: A landing comes down so far with the speed of its touch-down, m.
 _LAST = 3.0
-#: What descends or dives on purpose speeds up with so much at most, m/s^2: faster than autopilots
-#: do by default (ArduPilot PILOT_ACC_Z 2.5, PX4 MPC_ACC_DOWN_MAX 3), and half of the weight is
-#: still felt.
-_SPEEDS_UP = 4.5
+#: What descends or dives on purpose speeds up with so much at most, m/s^2: half of the weight is
+#: still felt; and what lands, as autopilots do by default (ArduPilot PILOT_ACC_Z; PX4
+#: MPC_ACC_DOWN_MAX 3).
+_SPEEDS_UP, _LANDS = 4.5, 2.5
 
 
 class ManoeuvreMotion(NamedTuple):
@@ -68,7 +68,7 @@ def landing(
 ) -> Manoeuvre:
     """From so high above the ground, m, with these, m/s, until it slows down and as it touches."""
     slows = (sink + touches) / 2.0  # m, in a second
-    lasts = max(1.0, (clearance - _LAST - slows) / sink + sink / (2.0 * _SPEEDS_UP))
+    lasts = max(1.0, (clearance - _LAST - slows) / sink + sink / (2.0 * _LANDS))
     return Manoeuvre("landing", touches, begin, round(lasts, 2), sink, slope)
 
 
@@ -92,10 +92,12 @@ def _throw(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     return _stopped(-GRAVITY * one.amount, passed - one.amount, 1.0)
 
 
-def _sinking(sink: float, lean: float, force: float, passed: float) -> ManoeuvreMotion:
+def _sinking(
+    sink: float, lean: float, force: float, passed: float, speeds_up: float = _SPEEDS_UP
+) -> ManoeuvreMotion:
     """Down with ever more, until it is this sink, m/s, in which it feels this force, m/s^2."""
-    speeds_up = _SPEEDS_UP if _SPEEDS_UP * passed < sink else 0.0
-    return ManoeuvreMotion(-min(sink, _SPEEDS_UP * passed), lean, force - speeds_up)
+    missing = speeds_up if speeds_up * passed < sink else 0.0
+    return ManoeuvreMotion(-min(sink, speeds_up * passed), lean, force - missing)
 
 
 def _dive(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
@@ -122,7 +124,7 @@ def _transition(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
 def _landing(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     """Down, slower before the ground, and on until it is there."""
     if passed < one.lasts:
-        return _sinking(one.sink, 0.1, GRAVITY, passed)
+        return _sinking(one.sink, 0.1, GRAVITY, passed, _LANDS)
     slowed = min(1.0, passed - one.lasts)
     braked = one.sink - one.amount if slowed < 1.0 else 0.0
     return ManoeuvreMotion(-one.sink + slowed * (one.sink - one.amount), 0.05, GRAVITY + braked)
