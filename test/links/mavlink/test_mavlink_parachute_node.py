@@ -5,17 +5,18 @@ import math
 import socket
 
 import pytest
-from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, VehicleState
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyDecision, VehicleState
 from chute_msgs.srv import Arm, Deploy, SetTriggers
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, do
-from node_bench import LOCAL, newest, port_of
+from node_bench import LOCAL, newest, port_of, stamped
 from sensor_msgs.msg import BatteryState
 
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import LinkState, ParachuteState
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.ros import qos
 
 
 @pytest.fixture
@@ -269,6 +270,53 @@ def test_garbage_is_counted_in_diagnostics_and_harms_nothing(bench, network):
         return link and values(link).get("dropped: bytes that are no MAVLink frame") == "1000"
 
     bench.until(counted, "each byte is counted")
+
+
+def test_a_line_of_which_much_cannot_be_read_warns(bench, network):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    network.plug(Module())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+
+        def warned():
+            noise.sendto(b"\xff" * 50, (LOCAL, port_of(network.node.loop)))
+            link = tasks(diagnostics).get("mavlink_parachute: link")
+            return link and link.level == DiagnosticStatus.WARN and "much could" in link.message
+
+        bench.until(warned, "the link warns")
+    told = tasks(diagnostics)["mavlink_parachute: link"].message
+    assert "s much could not be read, mostly: bytes that are no MAVLink frame (" in told
+
+
+class GroundStation(Autopilot):
+    """Reads the texts for the pilot, chunk by chunk."""
+
+    def __init__(self):
+        self.chunks = []
+        super().__init__()
+
+    def heard(self, frame):
+        if frame.message.get_type() == "STATUSTEXT":
+            self.chunks.append((frame.message.id, frame.message.chunk_seq, frame.message.text))
+        super().heard(frame)
+
+    @property
+    def texts(self):
+        """Whole, by their ids."""
+        ids = dict.fromkeys(number for number, _, _ in self.chunks)
+        return ["".join(text for one, _, text in sorted({*self.chunks}) if one == n) for n in ids]
+
+
+def test_the_pilot_reads_the_whole_reason_of_a_block_first(bench, network):
+    station = GroundStation()
+    network.plug(station)
+    reason = "battery of the parachute 13.9 V, need 14.0 V; packed 2019-04-01, need 2025 or later"
+    block = SafetyDecision(
+        epoch=1, id=1, action=SafetyDecision.FLIGHT_BLOCK, rule="links", reasons=[reason]
+    )
+    block.targets = ["mavlink_parachute"]
+    bench.publish(stamped(bench.client, block), "safety/decision", qos.DECISION)
+    whole = f"{reason}: flight blocked"
+    bench.until(lambda: whole in station.texts, "the whole text is received")
 
 
 def test_an_acknowledgement_that_nobody_waits_for_is_counted_in_diagnostics(bench, network):
