@@ -79,7 +79,7 @@ def test_a_ready_vehicle_is_well_and_its_json_is_one_object(ready):
     lines = soon(out).splitlines()
     assert lines[0] == "READY"
     assert "  mavlink_parachute  OK, device healthy, device <1 s ago, node <1 s ago" in lines
-    assert "  motors             DISARMED, <1 s ago" in lines
+    assert "  arming state       DISARMED, <1 s ago" in lines
     assert "  height             never received" in lines
     code, out, _ = as_json
     told = json.loads(out)

@@ -60,7 +60,7 @@ def test_a_vehicle_in_flight(heard):
         "parachutes",
         "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, <1 s ago",
         "vehicle 1/1, link OK",
-        "  motors             ARMED, <1 s ago",
+        "  arming state       ARMED, <1 s ago",
         "  landed state       IN_AIR, <1 s ago",
         "  height             61.2 m, <1 s ago",
         "  vertical speed     0.0 m/s, <1 s ago",
@@ -157,7 +157,7 @@ def test_what_is_old_is_not_shown_as_if_it_were_now(heard):
     text = heard.text(at=14.0)
     assert text[0] == "NOT KNOWN NOW (was READY, last word 14 s ago)"
     assert "  mavlink_parachute  OK, device healthy, node OLD: 14 s ago" in text
-    assert "  motors             ARMED, OLD: 14 s ago" in text
+    assert "  arming state       ARMED, OLD: 14 s ago" in text
     assert "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, OLD: 14 s ago" in text
     assert not heard.view(14.0).well
 
@@ -167,7 +167,7 @@ def test_a_part_of_the_vehicle_that_was_never_received_says_so(heard):
     heard.hears(vehicle(height_age=-1.0, armed_age=math.nan, vertical_speed=math.nan))
     text = heard.text()
     assert "  height             never received" in text
-    assert "  motors             never received" in text
+    assert "  arming state       never received" in text
     assert "  vertical speed     not known, <1 s ago" in text
 
 

@@ -193,7 +193,7 @@ def test_after_an_accident_all_that_matters_is_on_the_first_24_rows(screen, caps
         "upf_can 33         ARMED, armed, not deployed",
         "height             61.2 m",
         "vertical speed     0.0 m/s",
-        "motors             ARMED",
+        "arming state       ARMED",
         "battery            15.8 V, 87 %",
         "parachute open: KILL, acted on",
     ):

@@ -255,7 +255,7 @@ def _vehicle(picture: VehiclePicture) -> Iterator[StatusLine]:
     if one.battery_remaining == one.battery_remaining:
         battery += f", {one.battery_remaining * 100.0:.0f} %"
     for name, value, age in (
-        ("motors", one.armed, one.armed_age),
+        ("arming state", one.armed, one.armed_age),
         ("landed state", one.landed_state, one.landed_state_age),
         ("height", value_text(one.height, "m"), one.height_age),
         ("vertical speed", value_text(one.vertical_speed, "m/s"), one.vertical_speed_age),

@@ -142,7 +142,7 @@ def vehicle(picture: VehiclePicture) -> str:
             ("vertical speed", value_text(one.vertical_speed, "m/s"), one.vertical_speed_age),
             ("tilt", value_text(math.degrees(one.tilt), "°", 0), one.attitude_age),
             ("attitude", attitude, one.attitude_age),
-            ("motors", one.armed, one.armed_age),
+            ("arming state", one.armed, one.armed_age),
             ("landed state", one.landed_state, one.landed_state_age),
             ("battery", battery, one.battery_age),
         )
