@@ -42,6 +42,8 @@ _MANOEUVRES, _WRONG_SENSOR, _STANDS = 0.6, 0.5, 0.05
 _FAILS_IN_ONE = 0.1
 #: A manoeuvre ends so high, and a hill leaves so much room, m.
 _ROOM = 15.0
+#: An aeroplane flies so fast, m/s.
+_CRUISE = 20.0
 #: Heights are looked at for a second, of which the flight has settled for 0.3 s.
 SETTLED = 0.7
 #: Who flies it, where home does this and the vehicle is of this kind.
@@ -185,6 +187,9 @@ def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:
     else:
         sink, lasts = round(chance.uniform(1.5, 13.0), 1), round(chance.uniform(3.0, 8.0), 1)
         one, needs = Manoeuvre(kind, sink, begin, lasts), sink * (lasts + 1.0)
+        if drawn.profile == "fixed_wing":
+            # Down the way that it flies, which is so much faster.
+            one = replace(one, lean=round(math.degrees(math.asin(sink / _CRUISE)), 1))
     higher = round(max(0.0, needs - room), 1)
     # The parachute of a UPF that may release itself has limits of its own for what is flown.
     drawn = replace(drawn, manoeuvre=one, height=drawn.height + higher, aps=False)

@@ -31,7 +31,7 @@ class Manoeuvre:
     upright), descent (m/s), transition (degrees, from hovering to wings or back) or landing (m/s
     as it touches down); begin: s after it is up; lasts: s, and of a landing until it slows down to
     amount; sink: m/s, of a dive, a transition and a landing until then; slope: degrees, of the
-    ground on which it lands."""
+    ground on which it lands; lean: degrees, of a descent."""
 
     kind: str
     amount: float
@@ -39,6 +39,7 @@ class Manoeuvre:
     lasts: float = 0.0
     sink: float = 0.0
     slope: float = 0.0
+    lean: float = 11.5
 
     def __post_init__(self) -> None:
         if self.kind not in _FLOWN:
@@ -108,7 +109,7 @@ def _dive(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
 
 def _descent(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
     if passed < one.lasts:
-        return _sinking(one.amount, 0.2, GRAVITY, passed)
+        return _sinking(one.amount, math.radians(one.lean), GRAVITY, passed)
     return _stopped(-min(one.amount, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
 
 

@@ -54,7 +54,8 @@ _FALLS_FOR, _NO_SPEED = 0.23, 2.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
-#: Of an autopilot that is silent the last command counts, nearer: by speed, and by the heights.
+#: As fast as commanded: nearer than this, m/s. So nearly the last command of an autopilot that is
+#: silent counts, by its speed, and by the heights.
 _SINKS_ON, _SINKS_ON_BY_HEIGHTS = 1.0, 2.0
 #: In place of a measurement: that a wing sinks as its commanded attitude makes it. It leans by
 #: this at least, degrees: what falls flat does not.
@@ -127,11 +128,15 @@ def denials(
 
 
 def commanded(
-    tilt: float, attitude_error: float, sink_beyond_target: float, climb_beyond_target: float
+    tilt: float,
+    attitude_error: float,
+    target: float,
+    sink_beyond_target: float,
+    climb_beyond_target: float,
 ) -> Mapping[str, str]:
     """Measurement (or DIVE) -> in words that what it claims was commanded: no accident. Degrees
-    from upright and from the commanded attitude, and m/s of sink beyond the commanded one, by the
-    estimator and by what tells CLIMB_RATE; NaN: not known."""
+    from upright and from the commanded attitude, the commanded vertical speed, m/s, and m/s of
+    sink beyond it, by the estimator and by what tells CLIMB_RATE; NaN: not known."""
     told = {}
     if attitude_error <= _FOLLOWS:
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
@@ -140,9 +145,12 @@ def commanded(
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
         told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
-        # So is the force that is missing while it does so, of one that lies as it shall; not where
-        # another origin tells of a sink that nobody commanded.
-        if not attitude_error > _FOLLOWS and not climb_beyond_target > _SINKS_AS_TOLD:
+        # So is the force that is missing while it does so, of one that lies as it shall, or whose
+        # attitude alone is wrong: it comes down just as fast as it shall. Not where another origin
+        # tells of a sink that nobody commanded.
+        as_fast = target <= -_SINKS_ON and sink_beyond_target <= _SINKS_ON
+        lies_well = not attitude_error > _FOLLOWS
+        if (lies_well or as_fast) and not climb_beyond_target > _SINKS_AS_TOLD:
             told[ACCELERATION] = told[VERTICAL_SPEED]
     if climb_beyond_target <= _SINKS_AS_TOLD:
         told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"

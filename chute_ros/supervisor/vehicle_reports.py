@@ -186,7 +186,7 @@ def _note_contradictions(turn: Turn) -> None:
     since = {name: state.heard.denied_since.get(name, now) for name in denied}
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
     off = state.heard.vehicle.armed is Armed.DISARMED
-    told = {} if off else commanded(tilt, error, beyond, climb_beyond)
+    told = {} if off else commanded(tilt, error, target, beyond, climb_beyond)
     last_command = Sample(math.nan, math.nan) if off else _last_command(turn)
     if math.isnan(beyond):
         speed = readings.measured(turn.config, state, VERTICAL_SPEED, now)

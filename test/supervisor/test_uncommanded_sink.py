@@ -226,6 +226,34 @@ def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(
         assert story.newest(Action.KILL).rule == "uncommanded sink"
 
 
+def speeding_up(by: float, lags: float) -> Story:
+    """A descent begins with so much, m/s^2, or a fall beyond it, and the attitude turns over at
+    once. lags: m/s by which the vehicle is slower than its command; negative: faster."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, target_vertical_speed=0.0)
+    for k in range(1, 25):
+        speed = -0.05 * k * by
+        told = {"height": 50.0 - 0.5 * by * (0.05 * k) ** 2, "vertical_speed": speed}
+        tilt = min(60.0 * k, 168.0 + 0.1 * (k % 3))
+        told |= {"acceleration": 9.8 - by + 0.1 * (k % 3), "tilt": tilt}
+        told |= {
+            "attitude_error": 167.0,
+            "target_vertical_speed": speed - lags * min(1.0, 0.1 * k),
+        }
+        story.fly(story.t + 0.05, 0.05, **told)
+    return story
+
+
+@pytest.mark.parametrize("by", [2.9, 3.5, 4.5])
+def test_an_attitude_that_is_wrong_as_a_descent_begins_ends_no_flight(by: float) -> None:
+    """PX4 (MPC_ACC_DOWN_MAX 3) feels 6.8 m/s^2 as it begins one."""
+    assert speeding_up(by, 0.5).fired() == []
+
+
+@pytest.mark.parametrize("by", [4.5, 6.0])
+def test_one_that_lies_on_its_back_and_comes_down_faster_than_it_shall_falls(by: float) -> None:
+    assert speeding_up(by, -2.0).fired()[:1] == ["KILL"]
+
+
 # -- the last command of an autopilot that falls silent ------------------------------------------
 
 
