@@ -92,7 +92,7 @@ bench: build ## measure against bare scripts, write docs/evidence/bench.md
 
 pictures: build ## fly the tutorial in a browser, keep its pictures in docs/guide/pictures
 	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && CHUTE_PICTURES=docs/guide/pictures exec python3 -m pytest \
-	    -q -p no:cacheprovider -m "long or not long" test/panel -k "tutorial or twenty or phone or two_parachutes or rocket_from"
+	    -q -p no:cacheprovider -m "long or not long" test/panel -k "tutorial or twenty or phone or two_parachutes or not_guarded or rocket_from"
 
 newcomer: build ## from git clone to a parachute released on the page, in a new folder; write docs/evidence/newcomer.md
 	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && PYTHONPATH="$$PWD/test/panel:$$PYTHONPATH" \
