@@ -37,7 +37,10 @@ def assert_refused(command: ModuleType, monkeypatch, capsys, arguments, words: s
 
 #: As its executable, but it tells how far it is from the first flight on. orjson crashes by a
 #: Ctrl-C in the middle of its import, which a flight of a rocket would begin.
+#: A Ctrl-C ends it also where whoever runs the tests ignores one (a script's background job).
 _TELLS_AT_ONCE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import orjson
 from chute_ros.tools import {name}_command as command
 {changed}
