@@ -29,6 +29,7 @@ parachute could save, and the flights ended although they went well, in percent 
 campaign draws faults around each failure, far more often than flights have them: these shares
 compare guards, and are no rates of a fleet.
 """
+_RULES = "\nrules:\n"
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 #: How long a rule must hold and the like, as a profile names them.
 _COUNTS = ("for", "leak", "samples", "needed", "doubted", "clears")
@@ -57,7 +58,7 @@ def problems(folder: Path = _PROFILES) -> Iterable[str]:
             if not rule.get("source"):
                 yield f"{path.name}: the rule '{name}' has no source"
                 continue
-            why = " ".join((rule["source"], *of_rules.get(name, ()), *shared))
+            why = " ".join((rule["source"], *of_rules.get(name, ()), shared))
             known = {float(one) for one in _NUMBER.findall(why)}
             for what, value in _limits_of(rule):
                 if abs(value) not in known:
@@ -94,7 +95,7 @@ def _profile(profile: Mapping[str, Any], text: str) -> str:
         )
         for name, rule in profile["rules"].items()
     ]
-    tables = [plain(one) for one in shared]
+    tables = [plain(shared)] if shared else []
     if values:
         tables.append(list_table(("value", "is", "why and from where"), values, (20, 16, 64)))
     head = ("rule", "holds while, and how long", "why and from where")
@@ -120,37 +121,36 @@ def _word(value: object) -> str:
 
 def _comments(text: str) -> Iterator[tuple[str, str]]:
     """Of the keys before the rules: the comment above each."""
-    said: list[str] = []
-    for line in text.split("\nrules:")[0].splitlines():
-        if line.lstrip().startswith("#"):
-            said.append(line.strip().removeprefix("#").strip())
-        elif found := re.match(r"\s*([\w_]+):", line):
-            yield found[1], " ".join(said)
-            said = []
-        elif not line.strip():
-            said = []
+    for line, said in _commented(text.partition(_RULES)[0]):
+        if found := re.match(r"\s*([\w_]+):", line):
+            yield found[1], said
 
 
-def _rule_comments(text: str) -> tuple[list[str], dict[str, list[str]]]:
-    """Of the rules: what stands above the first, paragraph by paragraph; and rule -> the comments
-    above it and in it."""
-    shared: list[str] = []
+def _rule_comments(text: str) -> tuple[str, dict[str, list[str]]]:
+    """Of the rules: what stands above the first, and rule -> the comments above it and in it."""
+    shared, rule = "", ""
     of_rules: dict[str, list[str]] = {}
+    for line, said in _commented(text.partition(_RULES)[2]):
+        above = said
+        if found := re.match(r"  (\S[^:]*):$", line):
+            if not rule:
+                shared, above = said, ""
+            rule = found[1]
+            of_rules[rule] = []
+        if above:
+            of_rules[rule].append(above)
+    return shared, of_rules
+
+
+def _commented(text: str) -> Iterator[tuple[str, str]]:
+    """Each line that is no comment, with the comment just above it."""
     said: list[str] = []
-    rule = ""
-    for line in [*text.partition("\nrules:\n")[2].splitlines(), ""]:
+    for line in text.splitlines():
         if line.lstrip().startswith("#"):
             said.append(line.strip().removeprefix("#").strip())
-            continue
-        if found := re.match(r"  (\S[^:]*):$", line):
-            first, rule = not rule, found[1]
-            of_rules[rule] = []
-            if first:
-                shared, said = [" ".join(said)] * bool(said), []
-        if said:
-            of_rules[rule].append(" ".join(said))
+        else:
+            yield line, " ".join(said)
             said = []
-    return shared, of_rules
 
 
 def _moved() -> str:

@@ -39,7 +39,7 @@ from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import at_ctrl_c
-from chute_ros.model import Action
+from chute_ros.model import FIRES, Action
 from chute_ros.supervisor import (
     contradictions,
     counter,
@@ -52,7 +52,7 @@ from chute_ros.supervisor import (
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.rules import Profile
+from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.tools.arguments import positive
 from chute_ros.tools.entry import INTERRUPTED
 from chute_ros.tools.machine import machine
@@ -147,19 +147,35 @@ HEURISTICS: dict[str, tuple[Any, str, Any]] = {
         "commanded",
         lambda *_: {},
     ),
+    "contradictions: the last command of a silent autopilot counts": (
+        vehicle_reports,
+        "commanded_last",
+        lambda *_: {},
+    ),
+    "readings: heights tell a sink beside a speed in doubt": (
+        readings,
+        "_sink_beyond_target",
+        _nan,
+    ),
 }
+
+
+def shipped_rules() -> Iterator[tuple[str, Rule]]:
+    """Each rule, with the name of its profile."""
+    for name in PROFILES:
+        for rule in read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",)).rules:
+            yield name, rule
 
 
 def profile_parts() -> Iterator[str]:
     """Each rule that fires, and each of its conditions where it has more than one."""
-    for name in PROFILES:
-        for rule in read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",)).rules:
-            if rule.action is Action.NONE:
-                continue
-            yield f"{name}: {rule.name}"
-            for number, one in enumerate(rule.conditions):
-                if len(rule.conditions) > 1 and isinstance(one, MeasurementCondition):
-                    yield f"{name}: {rule.name}: {number + 1}, {one.measurement}"
+    for name, rule in shipped_rules():
+        if rule.action is Action.NONE:
+            continue
+        yield f"{name}: {rule.name}"
+        for number, one in enumerate(rule.conditions):
+            if len(rule.conditions) > 1 and isinstance(one, MeasurementCondition):
+                yield f"{name}: {rule.name}: {number + 1}, {one.measurement}"
 
 
 def changed(profile: Profile, what: str) -> Profile:
@@ -338,12 +354,7 @@ def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
 
 def deciding_rules() -> list[str]:
     """ "profile: rule" of each rule that stops motors or releases, in the profile's order."""
-    return [
-        f"{name}: {rule.name}"
-        for name in PROFILES
-        for rule in read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",)).rules
-        if rule.action in (Action.KILL, Action.DEPLOY)
-    ]
+    return [f"{name}: {rule.name}" for name, rule in shipped_rules() if rule.action in FIRES]
 
 
 def contributions(pool: Pool, flights: Sequence[str]) -> list[tuple[str, ...]]:

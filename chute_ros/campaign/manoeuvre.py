@@ -101,16 +101,21 @@ def _sinking(
     return ManoeuvreMotion(-min(sink, speeds_up * passed), lean, force - missing)
 
 
-def _dive(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
+def _sunk(
+    one: Manoeuvre, passed: float, sink: float, degrees: float, force: float
+) -> ManoeuvreMotion | None:
+    """As _sinking as long as it lasts, and then stopped."""
     if passed < one.lasts:
-        return _sinking(one.sink, math.radians(one.amount), 1.1 * GRAVITY, passed)
-    return _stopped(-min(one.sink, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
+        return _sinking(sink, math.radians(degrees), force, passed)
+    return _stopped(-min(sink, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
+
+
+def _dive(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
+    return _sunk(one, passed, one.sink, one.amount, 1.1 * GRAVITY)
 
 
 def _descent(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:
-    if passed < one.lasts:
-        return _sinking(one.amount, math.radians(one.lean), GRAVITY, passed)
-    return _stopped(-min(one.amount, _SPEEDS_UP * one.lasts), passed - one.lasts, 1.0)
+    return _sunk(one, passed, one.amount, one.lean, GRAVITY)
 
 
 def _transition(one: Manoeuvre, passed: float) -> ManoeuvreMotion | None:

@@ -120,9 +120,9 @@ class Clause(Generic[BenchT]):
     restarts: bool = False
 
     @property
-    def in_reach(self) -> bool:
-        """A bench can show it."""
-        return not isinstance(self.trial, OutOfReach)
+    def out_of_reach(self) -> str:
+        """Why no bench can show it; empty: one can."""
+        return self.trial.why if isinstance(self.trial, OutOfReach) else ""
 
 
 @dataclass(frozen=True)

@@ -161,12 +161,12 @@ def commanded_last(target: float, speed: float, rate: float) -> Mapping[str, str
     """The same of a vehicle whose autopilot is silent: it sinks on as it was commanded last, which
     what falls does not for long. target, speed: vertical, m/s; rate: CLIMB_RATE; NaN: not known.
     A force that is missing is none of it."""
-    told = {}
-    if target - speed <= _SINKS_ON:
-        told[VERTICAL_SPEED] = f"it was commanded ({target:+.1f} m/s, when last heard)"
-    if target - rate <= _SINKS_ON_BY_HEIGHTS:
-        told[CLIMB_RATE] = f"it was commanded ({target:+.1f} m/s, when last heard)"
-    return told
+    as_fast = {
+        VERTICAL_SPEED: target - speed <= _SINKS_ON,
+        CLIMB_RATE: target - rate <= _SINKS_ON_BY_HEIGHTS,
+    }
+    told = f"it was commanded ({target:+.1f} m/s, when last heard)"
+    return {name: told for name, so in as_fast.items() if so}
 
 
 def _last(motion: tuple[Moment, ...], seconds: float) -> list[Moment]:

@@ -36,6 +36,9 @@ class Sample:
     measured_at: float
 
 
+NO_SAMPLE = Sample(math.nan, math.nan)
+
+
 @dataclass(frozen=True)
 class Doubts:
     """What a source, which tells a measurement no more, has put in doubt; see Measured."""

@@ -14,7 +14,7 @@ from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measured import Measured, Sample
+from chute_ros.supervisor.measured import NO_SAMPLE, Measured, Sample
 from chute_ros.supervisor.pending import Ask, Pending, Time
 
 #: A measurement that is contradicted for so long is an alarm in flight and blocks it before, s.
@@ -134,7 +134,7 @@ class HeardHere:
     commanded: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: The vertical speed that was commanded last, m/s; NaN: none, or of motors that are off, or
     #: the autopilot has reported since and commands none.
-    commanded_speed: Sample = Sample(math.nan, math.nan)
+    commanded_speed: Sample = NO_SAMPLE
     #: Measurement -> what it told that cannot be; it is not used until it tells what can.
     unfit: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: Since when it tells otherwise of its fitness on the ground, monotonic s.

@@ -17,7 +17,7 @@ from chute_ros.supervisor.contradictions import (
 )
 from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measured import Sample
+from chute_ros.supervisor.measured import NO_SAMPLE, Sample
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
@@ -187,7 +187,7 @@ def _note_contradictions(turn: Turn) -> None:
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
     off = state.heard.vehicle.armed is Armed.DISARMED
     told = {} if off else commanded(tilt, error, target, beyond, climb_beyond)
-    last_command = Sample(math.nan, math.nan) if off else _last_command(turn)
+    last_command = NO_SAMPLE if off else _last_command(turn)
     if math.isnan(beyond):
         speed = readings.measured(turn.config, state, VERTICAL_SPEED, now)
         told = {**told, **commanded_last(last_command.value, speed, rate)}
@@ -213,7 +213,7 @@ def _last_command(turn: Turn) -> Sample:
     if not math.isnan(vehicle.target_vertical_speed):
         last = Sample(vehicle.target_vertical_speed, received - vehicle.target_age)
     reported = received - min(vehicle.armed_age, vehicle.landed_state_age)
-    return last if reported <= last.measured_at + _COMMANDS_ON else Sample(math.nan, math.nan)
+    return last if reported <= last.measured_at + _COMMANDS_ON else NO_SAMPLE
 
 
 def _height_denied(turn: Turn) -> str:

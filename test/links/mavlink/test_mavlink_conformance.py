@@ -26,7 +26,7 @@ from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 from chute_ros.sim.mavlink_device import Params
 
 NAMES = [one.name for one in CLAUSES]
-IN_REACH = [one.name for one in CLAUSES if one.in_reach]
+IN_REACH = [one.name for one in CLAUSES if not one.out_of_reach]
 OF_SIGNING = ["unsigned-refused", "wrong-key-refused", "replay-refused", "signed-answers"]
 
 

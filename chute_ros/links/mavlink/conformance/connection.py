@@ -123,7 +123,7 @@ def _information(bench: MavlinkBench) -> Any:
     return told[-1]
 
 
-def _is_readable(told: ReceivedFrame, *fields: str) -> None:
+def _require_readable(told: ReceivedFrame, *fields: str) -> None:
     for field in fields:
         text = getattr(told.message, field)
         if not str(text).isprintable():
@@ -132,7 +132,7 @@ def _is_readable(told: ReceivedFrame, *fields: str) -> None:
 
 def _information_texts(bench: MavlinkBench) -> Trial:
     told = yield from _information(bench)
-    _is_readable(told, "vendor_name", "model_name", "software_version", "hardware_version")
+    _require_readable(told, "vendor_name", "model_name", "software_version", "hardware_version")
     message = told.message
     if not message.vendor_name or not message.model_name:
         raise failed("vendor_name and model_name are empty", [told.packet])
@@ -141,7 +141,7 @@ def _information_texts(bench: MavlinkBench) -> Trial:
 
 def _information_serial(bench: MavlinkBench) -> Trial:
     told = yield from _information(bench)
-    _is_readable(told, "serial_number")
+    _require_readable(told, "serial_number")
     return told.message.serial_number or "not provided"
 
 
