@@ -173,6 +173,16 @@ def _last(motion: tuple[Moment, ...], seconds: float) -> list[Moment]:
     return [one for one in motion if motion[-1][0] - one[0] <= seconds + _APART / 2.0]
 
 
+def _newest(motion: tuple[Moment, ...]) -> list[Moment]:
+    """Of the time over which it must be carried; at 5 Hz a few take longer."""
+    newest = _last(motion, _CARRIED_FOR) if motion else []
+    if len(newest) >= _FEW:
+        return newest
+    few = motion[-_FEW:]
+    alike = all(after[0] - before[0] <= _GAP for before, after in pairwise(few))
+    return list(few) if alike else newest
+
+
 def _told_meanwhile(motion: tuple[Moment, ...], barometer: Rise) -> float:
     """The vertical speed over the barometer's time: in a fall that speeds up the newest is twice
     as much. NaN: none was told, or the barometer reports nothing."""
@@ -381,8 +391,7 @@ def _carried(motion: tuple[Moment, ...], leaning: bool = False) -> list[Moment]:
     """The newest moments, if an accelerometer that lives tells in all of them that the vehicle is
     carried in full; empty: it does not. leaning: by the part of the force that points upwards, as
     far as it leans less than what lies on its side."""
-    newest = _last(motion, _CARRIED_FOR) if motion else []
-    known = [one for one in newest if not any(map(math.isnan, one))]
+    known = [one for one in _newest(motion) if not any(map(math.isnan, one))]
     if len(known) < _FEW or known[-1] is not motion[-1]:
         return []
     if leaning and min(one[3] for one in known) < _ON_ITS_SIDE:

@@ -280,11 +280,11 @@ def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turn
 def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_no_deploy() -> None:
     waits = {"kill_to_deploy_delay": 2.0, "low_kill_to_deploy_delay": 2.0}
     story = Story(shipped("multirotor", **waits)).flying().fly(2.0, height=30.0)
-    story.fall(5.0, 30.0)
+    story.fall(5.1, 30.0)
     assert story.fired() == ["KILL"]
     assert any("after the kill: height" in text for text in story.alarms())
-    story.at(5.0, i.DeployRequest(5, False, "all the same"))
-    story.at(7.1)
+    story.at(5.1, i.DeployRequest(5, False, "all the same"))
+    story.at(7.2)
     assert "DEPLOY" in story.fired(), "a person's is never held back by it"
 
 

@@ -339,10 +339,10 @@ def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
 
 
 def test_an_ack_however_late_is_no_confirmation() -> None:
-    story = aloft(**LADDER).fall(2.5, 2000.0)
+    story = aloft(**LADDER).fall(2.6, 2000.0)
     first = story.newest(D)
     late = i.ActionReport(first.epoch, first.id, LINK, Outcome.ACCEPTED, "ACK", first.epoch)
-    story.at(2.5, story.heartbeat(UPF), late)
+    story.at(2.6, story.heartbeat(UPF), late)
     story.at(5.0, story.heartbeat(UPF), late)
     assert story.state.stage is Stage.DEPLOYING
     story.at(60.0)

@@ -71,7 +71,7 @@ def test_how_long_can_be_set_and_it_is_never_longer_than_elsewhere(
 
 def test_what_comes_low_as_it_waits_waits_no_longer() -> None:
     """A few decimetres more of height must not put the release off by three tenths."""
-    waits = [waited(falls_from(height / 10.0)) for height in range(320, 400, 4)]
+    waits = [waited(falls_from(height / 10.0)) for height in range(320, 420, 4)]
     assert waits == sorted(waits)
     assert {0.2, 0.5} < set(waits)
 

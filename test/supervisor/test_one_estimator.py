@@ -177,6 +177,27 @@ def test_an_estimator_that_sinks_while_the_vehicle_hovers_ends_no_flight(
     assert any("vertical_speed is contradicted" in one for one in teller.story.alarms())
 
 
+@AIRCRAFT
+@pytest.mark.parametrize("every", [0.05, 0.1, 0.15, 0.18, 0.2, 0.22])
+@pytest.mark.parametrize("targets", [False, True])
+def test_an_estimator_that_sinks_in_a_hover_is_denied_by_force_at_each_rate(
+    profile: str, every: float, targets: bool
+) -> None:
+    """Given no barometer; and the least rate that the profiles allow, 5 Hz, and its jitter."""
+    teller = told_to(profile)
+    story, height, speed = teller.story, 60.0, 0.0
+    told = {"target_vertical_speed": 0.0, "attitude_error": 2.0} if targets else {}
+    until = story.t + 14.0
+    while story.t < until:
+        speed -= 3.0 * every * (story.t > until - 8.0)
+        height += every * speed
+        told |= {"acceleration": 9.8 + teller.noise(0.8), "tilt": 3.0 + teller.noise(2.0)}
+        felt = {"height": height, "vertical_speed": speed + teller.noise(0.2)}
+        story.at(story.t + every, story.heartbeat(), story.told(**felt, **told))
+    assert story.fired() == []
+    assert any("vertical_speed is contradicted" in one for one in story.alarms())
+
+
 @settings(max_examples=25)
 @given(
     pushes=st.lists(st.floats(-8.0, 8.0), min_size=2, max_size=6),
@@ -377,6 +398,29 @@ def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer() -> None
     assert teller.story.when(Action.DEPLOY) - start < 2.5
 
 
+@AIRCRAFT
+@pytest.mark.parametrize(("turns", "thrust"), [(1.5, 0.7), (2.0, 0.6), (2.0, 0.7), (2.5, 0.7)])
+def test_a_tumble_with_some_of_its_thrust_is_not_hidden_by_a_hovering_estimator(
+    profile: str, turns: float, thrust: float
+) -> None:
+    """Given a last speed of 12 m/s: barometer and accelerometer are two origins against one.
+    turns: rad/s; thrust: of its weight."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 110.0, true_height=110.0)
+    start, height, speed = teller.story.t, 110.0, 0.0
+    while height > 40.0 and not deployed(teller):
+        lean = turns * (teller.story.t - start)
+        drag = GRAVITY * (speed / 12.0) ** 2
+        side, up = thrust * GRAVITY * math.sin(lean), thrust * GRAVITY * math.cos(lean) + drag
+        speed += EVERY * (up - GRAVITY)
+        height += EVERY * speed
+        told = {"height": 110.0 + teller.noise(0.1), "vertical_speed": teller.noise(0.2)}
+        teller.tell(**told, tilt=3.0, force=math.hypot(side, up), true_height=height)
+    assert deployed(teller)
+    assert height > 60.0
+
+
 # -- accelerometers ----------------
 
 
@@ -429,6 +473,34 @@ def test_one_wrong_sensor_in_a_descent_that_is_flown_ends_no_flight(
             height=height, vertical_speed=speed + teller.noise(0.2), true_height=height, **told
         )
     assert teller.story.fired() == []
+
+
+@pytest.mark.parametrize("sink", [6.0, 6.5, 7.0])
+@pytest.mark.parametrize("barometer", [True, False])
+@pytest.mark.parametrize("every", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize(
+    ("part", "wrong"), [("vertical_speed", -12.0), ("acceleration", -7.8)], ids=["speed", "force"]
+)
+def test_one_wrong_number_in_the_fastest_descent_by_hand_ends_no_flight(
+    sink: float, barometer: bool, every: float, part: str, wrong: float
+) -> None:
+    """Given no targets, and 7 m/s, which pilots sink on with as they chop the throttle."""
+    teller = told_to("multirotor")
+    teller.stand(1.0, **({"true_height": 0.0} if barometer else {}))
+    story, height, speed = teller.story, 100.0, 0.0
+    began = story.t
+    while story.t < began + 10.0:
+        passed = story.t - began - 4.0
+        speed = -min(sink, max(0.0, 3.0 * passed))
+        height += every * speed
+        told = {"vertical_speed": speed + teller.noise(0.2), "acceleration": 9.8}
+        told["acceleration"] += teller.noise(0.6)
+        told[part] += wrong if passed > 3.5 else 0.0
+        if barometer:
+            told["pressure"] = pressure_at(height + teller.noise(0.4))
+        inputs = story.told(height=height, tilt=5.0, **told)
+        story.at(story.t + every, story.heartbeat(), inputs)
+    assert story.fired() == []
 
 
 # -- a landing that is not believed ----------------

@@ -131,7 +131,7 @@ def test_on_the_ground_nobody_needs_a_guard() -> None:
 
 def test_a_kill_says_by_which_rule_why_when_and_where() -> None:
     story = Story(shipped("multirotor")).flying().fly(2.0, height=100.0)
-    story.fall(2.95, height=100.0)
+    story.fall(3.05, height=100.0)
     assert story.state.stage is Stage.KILLING
     rule = story.newest(Action.KILL).rule
     says = next(one.says for one in story.config.profile.rules if one.name == rule)
