@@ -64,8 +64,8 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         vehicle = link.vehicle_state(now)
         # Doubt about which devices are ours, and one that does not hear us, forbid take-off, but
-        # take nothing back in flight.
-        on_ground = vehicle.armed is not Armed.ARMED
+        # take nothing back in flight. Nor does one that arms under the block lift it by that.
+        on_ground = vehicle.armed is not Armed.ARMED or link.held_on_ground(now)
         doubts = link.doubts(now) if on_ground else []
         autopilot = _why_no_kill(vehicle)
         if not self.settings.expect_parachute:

@@ -35,6 +35,8 @@ from chute_ros.protocol.requests import Requests
 
 #: What a parameter of a command can hold; an hour.
 _LONGEST_INTERVAL_US = 3.6e9
+#: Frames are numbered with 8 bits, and some of 256 are lost.
+_NUMBERS_GO_ROUND = 128
 
 
 class MavlinkLink:
@@ -55,7 +57,8 @@ class MavlinkLink:
         self._inbox = FrameReceiver(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         window = config.commands.late_ack_window
-        self._acknowledgements, self._heartbeats = Duplicates(window), Duplicates(window)
+        self._acknowledgements = Duplicates(window)
+        self._heartbeats = Duplicates(window, _NUMBERS_GO_ROUND)
         self._announcements = Announcements()
         #: In which flight, counted by armings, a deploy was decided last.
         self._deploy_decided_in = -1
@@ -255,6 +258,12 @@ class MavlinkLink:
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
+
+    def held_on_ground(self, now: float) -> bool:
+        """Flight is blocked and, as far as is known, our vehicle has not left the ground, whether
+        it is armed or not."""
+        autopilot = self._devices.chosen_autopilot()
+        return autopilot is not None and self._care.block.stands(autopilot, now)
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""

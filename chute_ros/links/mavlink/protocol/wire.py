@@ -55,19 +55,23 @@ class Duplicates:
     """Knows a frame that the network delivers twice (two paths, a router that echoes).
 
     A copy has the same bytes, sequence number included. Where a sender never counts its frames
-    up, nothing is known to be a copy.
+    up, nothing is known to be a copy. within: nor after so many frames of its sender, whose eight
+    bits of numbers have gone round by then: its next heartbeat may be the same to the last bit.
     """
 
-    def __init__(self, window: float) -> None:
-        self._window = window
+    def __init__(self, window: float, within: float = math.inf) -> None:
+        self._window, self._within = window, within
         self._first_sequence: dict[tuple[int, int], int] = {}
+        self._heard: Counter[tuple[int, int]] = Counter()
         self._counting: set[tuple[int, int]] = set()
-        self._seen: deque[tuple[float, bytes]] = deque(maxlen=64)
+        self._seen: deque[tuple[float, bytes, int]] = deque(maxlen=64)
 
     def heard(self, frame: Frame) -> None:
         """Watch whether the sender counts its frames."""
         sender = (frame.system_id, frame.component_id)
         first = self._first_sequence.get(sender)
+        if first is not None:
+            self._heard[sender] += 1
         if first is not None and frame.sequence != first:
             self._counting.add(sender)
         elif first is None and len(self._first_sequence) < 256:
@@ -78,10 +82,12 @@ class Duplicates:
         while self._seen and now - self._seen[0][0] > self._window:
             self._seen.popleft()
         raw = bytes(frame.message.get_msgbuf())
-        counts = (frame.system_id, frame.component_id) in self._counting
-        if counts and any(raw == seen for _, seen in self._seen):
+        sender = (frame.system_id, frame.component_id)
+        heard = self._heard[sender]
+        alike = any(raw == seen and heard - at < self._within for _, seen, at in self._seen)
+        if sender in self._counting and alike:
             return True
-        self._seen.append((now, raw))
+        self._seen.append((now, raw, heard))
         return False
 
 

@@ -1,8 +1,11 @@
 """A block holds until the vehicle is off the ground by its height, whatever its landed state."""
 
+from typing import Any
+
 import pytest
 from link_bench import Bench, ack, ardupilot, copter, landed, px4_integer, setting
 
+from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PILOT = (1, 1)
@@ -266,3 +269,25 @@ def test_an_autopilot_that_asks_another_is_said():
     bench.hear(PILOT, px4_integer("COM_ARM_AUTH_ID", 10))
     (warning,) = block_warnings(bench)
     assert "COM_ARM_AUTH_ID is 10, and not our system id 1" in warning
+
+
+def test_arming_lifts_no_block_that_stands_for_a_doubt():
+    """Given autopilots of two systems, so that flight is blocked; one is armed, and the order to
+    disarm is lost, or refused."""
+    settings = MavlinkSettings(expect_parachute=False)
+    runtime = MavlinkRuntime("mavlink_parachute", settings, Any)
+    bench = on_the_ground(reason="autopilots of systems 1, 2")
+    bench.hear((2, 1), copter())
+
+    def healthy():
+        return runtime.summarise(bench.link, bench.now).device_healthy
+
+    assert not healthy()
+    bench.at(0.7).hear(PILOT, quadplane(True), at_height(0.1), landed(IN_AIR))
+    assert not healthy(), "it is armed, and stands"
+    bench.at(1.1).hear(PILOT, quadplane(True), at_height(0.3), landed(IN_AIR))
+    assert not healthy()
+    # In flight nothing is taken back.
+    for height in range(1, 20):
+        bench.at(bench.t + 0.1).hear(PILOT, quadplane(True), at_height(height), landed(IN_AIR))
+    assert healthy()

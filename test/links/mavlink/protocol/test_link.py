@@ -233,6 +233,24 @@ def test_vehicle_is_the_chosen_autopilots_alone():
     assert bench.events[-1].state.armed is Armed.ARMED
 
 
+@pytest.mark.parametrize("frames", [51, 64, 85, 128, 256])
+@pytest.mark.parametrize("lost", [0.0, 0.3])
+def test_a_heartbeat_with_the_number_of_an_earlier_one_is_no_copy_of_it(frames, lost):
+    """Given so many frames from one heartbeat, each second, to the next: numbers have 8 bits, so
+    that heartbeats within five seconds are the same to the last bit."""
+    bench, chance = Bench(), random.Random(frames)
+    bench.hear(PILOT, copter())
+    for second in range(1, 30):
+        told = [copter(), *[d.MAVLink_system_time_message(0, second * 1000)] * (frames - 1)]
+        raw = [bench.encoder(PILOT).encode(one, bench.now) for one in told]
+        bench.at(float(second))
+        for number, one in enumerate(raw):
+            if number == 0 or chance.random() >= lost:
+                bench.link.receive(one, bench.now)
+        state = bench.link.vehicle_state(bench.now)
+        assert state.armed_age < 0.1, f"{second} s"
+
+
 def test_link_comes_up_falls_silent_and_comes_back_and_restarts_are_told():
     # Link comes up falls silent and comes back.
     bench = Bench().hear(CHUTE, heartbeat()).at(6.0).hear(CHUTE, heartbeat())
