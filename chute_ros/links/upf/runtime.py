@@ -25,7 +25,7 @@ from chute_ros.model import (
 )
 from chute_ros.protocol.events import AskSupervisor, Notice, SafetyAsk, Severity, failed_request
 from chute_ros.protocol.goal import EffectFinished
-from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
 from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
 from chute_ros.settings import nested, parameter
 from chute_ros.supervisor.config import TRIGGER
@@ -59,6 +59,8 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
     BLOCKS_FLIGHT = False
     # Has left by then, and the supervisor needs the processor now.
     UNHURRIED = (AskSupervisor,)
+    #: Flight is blocked since before the vehicle was in the air, or armed.
+    _held = False
 
     def __init__(self, *options: Any, **more: Any) -> None:
         super().__init__(*options, **more)
@@ -78,7 +80,10 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
         sound = not (troubles or link.devices.missing_trigger()) and all(
             one.sound for one in link.devices.triggers.values()
         )
-        healthy = picture.healthy and (sound or link.in_air(now))
+        # Nor does one that arms under a flight block lift it by that.
+        in_air = link.in_air(now)
+        self._held = bool(self.decided_block) and (self._held or not in_air)
+        healthy = picture.healthy and (sound or (in_air and not self._held))
         liveness = device.liveness
         return Summary(liveness.state, healthy, liveness.age(now), () if healthy else reasons)
 
@@ -92,6 +97,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
             text = "a UPF parachute stops no motors: take upf_can out of kill_links"
             self.decisions.report(decision, Outcome.FAILED, text)
         elif decision.action is not Action.NONE:
+            self.decided_block = block_reason(decision)
             # The device asks for it and does nothing about it itself.
             text = "noted; nothing goes to the device"
             self.decisions.report(decision, Outcome.CONFIRMED, text)

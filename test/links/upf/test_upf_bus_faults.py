@@ -3,9 +3,10 @@
 import random
 
 import pytest
-from chute_msgs.msg import LinkHeartbeat, ParachuteStatus
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyDecision
 from chute_msgs.srv import Arm, Deploy, GetNodeInfo
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from node_bench import stamped
 from upf_bench import Devices, Network, fly, tasks, values
 
 from chute_ros.links.upf.protocol.config import NODE_ID
@@ -13,6 +14,7 @@ from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, TRIGGER_S
 from chute_ros.model import LinkState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS
 from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
+from chute_ros.ros import qos
 from chute_ros.sim.can_faults import CanFaultKnobs
 
 #: A bus that loses much needs limits to match.
@@ -193,6 +195,30 @@ def test_two_devices_with_one_node_id_forbid_take_off_only(bench):
     devices.await_beat(device_healthy=True)
     bench.unplug(twin)
     await_well(bench, diagnostics)
+
+
+def test_one_that_arms_or_flies_under_a_flight_block_lifts_it_not_by_that(bench):
+    """Given a doubt as flight is blocked, and an order to disarm that is lost; by its height the
+    supervisor knows when it flies, and releases the block."""
+    network = Network(bench, vehicle_state_age=60.0)
+    devices = Devices(network)
+    bench.until(lambda: network.link.bus.nodes.get(33).uptime >= 4, "it runs for a while")
+    network.plug(network.controller())
+    devices.await_beat(device_healthy=False)
+
+    def decide(number, action):
+        decision = SafetyDecision(epoch=1, id=number, action=action, rule="links")
+        decision.targets = ["upf_can"]
+        bench.publish(stamped(bench.client, decision), "safety/decision", qos.DECISION)
+
+    decide(1, SafetyDecision.FLIGHT_BLOCK)
+    bench.until(lambda: network.node.runtime._held, "it is blocked")
+    fly(bench, network)
+    devices.beats.clear()
+    bench.until(lambda: len(devices.beats) >= 5, "five heartbeats")
+    assert not any(one.device_healthy for one in devices.beats)
+    decide(2, SafetyDecision.FLIGHT_BLOCK_RELEASE)
+    devices.await_beat(device_healthy=True)
 
 
 def test_another_node_with_our_node_id_is_told_and_forbids_take_off(bench):
