@@ -59,11 +59,11 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
     BLOCKS_FLIGHT = False
     # Has left by then, and the supervisor needs the processor now.
     UNHURRIED = (AskSupervisor,)
-    #: Flight is blocked since before the vehicle was in the air, or armed.
-    _held = False
 
     def __init__(self, *options: Any, **more: Any) -> None:
         super().__init__(*options, **more)
+        #: Flight is blocked since before the vehicle was in the air, or armed.
+        self._held = False
         #: Kills that were confirmed: (epoch, id, link) of the newest reports.
         self._kills: deque[tuple[int, int, str]] = deque(maxlen=_MOST_KILLS)
 
@@ -76,13 +76,13 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
         device = link.devices.controller() or link.devices.trigger()
         assert device is not None
         # Doubt about who is on the bus, or a trigger that is in trouble or was never received,
-        # forbids take-off, but takes nothing back in flight.
+        # forbids take-off, but takes nothing back in flight. One that arms under a flight block
+        # does not fly by that: the supervisor knows its height, and releases the block.
+        in_air = link.in_air(now)
+        self._held = bool(self.decided_block) and (self._held or not in_air)
         sound = not (troubles or link.devices.missing_trigger()) and all(
             one.sound for one in link.devices.triggers.values()
         )
-        # Nor does one that arms under a flight block lift it by that.
-        in_air = link.in_air(now)
-        self._held = bool(self.decided_block) and (self._held or not in_air)
         healthy = picture.healthy and (sound or (in_air and not self._held))
         liveness = device.liveness
         return Summary(liveness.state, healthy, liveness.age(now), () if healthy else reasons)

@@ -25,7 +25,7 @@ from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.links.mavlink.protocol.wire import Duplicates, FrameReceiver, Outbox
+from chute_ros.links.mavlink.protocol.wire import Duplicates, FrameReceiver, Outbox, Senders
 from chute_ros.model import Armed, LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -57,8 +57,9 @@ class MavlinkLink:
         self._inbox = FrameReceiver(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         window = config.commands.late_ack_window
-        self._acknowledgements = Duplicates(window)
-        self._heartbeats = Duplicates(window, _NUMBERS_GO_ROUND)
+        self._senders = Senders()
+        self._acknowledgements = Duplicates(self._senders, window)
+        self._heartbeats = Duplicates(self._senders, window, _NUMBERS_GO_ROUND)
         self._announcements = Announcements()
         #: In which flight, counted by armings, a deploy was decided last.
         self._deploy_decided_in = -1
@@ -288,8 +289,7 @@ class MavlinkLink:
 
     def _frame(self, frame: Frame, now: float) -> None:
         message, ids = frame.message, (frame.system_id, frame.component_id)
-        self._acknowledgements.heard(frame)
-        self._heartbeats.heard(frame)
+        self._senders.heard(frame)
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)

@@ -51,6 +51,31 @@ class FrameReceiver:
             self._streams.pop(stream, None)
 
 
+class Senders:
+    """Who counts its frames up, and how many came of each."""
+
+    def __init__(self) -> None:
+        self._first_sequence: dict[tuple[int, int], int] = {}
+        self._counting: set[tuple[int, int]] = set()
+        self._heard: Counter[tuple[int, int]] = Counter()
+
+    def heard(self, frame: Frame) -> None:
+        """A frame came."""
+        sender = (frame.system_id, frame.component_id)
+        first = self._first_sequence.get(sender)
+        if first is not None:
+            self._heard[sender] += 1
+            if frame.sequence != first:
+                self._counting.add(sender)
+        elif len(self._first_sequence) < 256:
+            self._first_sequence[sender] = frame.sequence
+
+    def number_of(self, frame: Frame) -> int | None:
+        """How many frames came of its sender; None: it is not known to count them."""
+        sender = (frame.system_id, frame.component_id)
+        return self._heard[sender] if sender in self._counting else None
+
+
 class Duplicates:
     """Knows a frame that the network delivers twice (two paths, a router that echoes).
 
@@ -59,35 +84,21 @@ class Duplicates:
     bits of numbers have gone round by then: its next heartbeat may be the same to the last bit.
     """
 
-    def __init__(self, window: float, within: float = math.inf) -> None:
-        self._window, self._within = window, within
-        self._first_sequence: dict[tuple[int, int], int] = {}
-        self._heard: Counter[tuple[int, int]] = Counter()
-        self._counting: set[tuple[int, int]] = set()
+    def __init__(self, senders: Senders, window: float, within: float = math.inf) -> None:
+        self._senders, self._window, self._within = senders, window, within
+        #: When it came, its bytes, and how many of its sender had come by then.
         self._seen: deque[tuple[float, bytes, int]] = deque(maxlen=64)
-
-    def heard(self, frame: Frame) -> None:
-        """Watch whether the sender counts its frames."""
-        sender = (frame.system_id, frame.component_id)
-        first = self._first_sequence.get(sender)
-        if first is not None:
-            self._heard[sender] += 1
-        if first is not None and frame.sequence != first:
-            self._counting.add(sender)
-        elif first is None and len(self._first_sequence) < 256:
-            self._first_sequence[sender] = frame.sequence
 
     def is_copy(self, frame: Frame, now: float) -> bool:
         """This very frame came within the window."""
         while self._seen and now - self._seen[0][0] > self._window:
             self._seen.popleft()
-        raw = bytes(frame.message.get_msgbuf())
-        sender = (frame.system_id, frame.component_id)
-        heard = self._heard[sender]
-        alike = any(raw == seen and heard - at < self._within for _, seen, at in self._seen)
-        if sender in self._counting and alike:
+        raw, number = bytes(frame.message.get_msgbuf()), self._senders.number_of(frame)
+        if number is not None and any(
+            raw == seen and number - at < self._within for _, seen, at in self._seen
+        ):
             return True
-        self._seen.append((now, raw, heard))
+        self._seen.append((now, raw, number or 0))
         return False
 
 
