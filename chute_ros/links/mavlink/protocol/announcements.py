@@ -16,6 +16,9 @@ from chute_ros.protocol.mavlink.dialect import dialect
 
 #: Another reason of the block is said no more often than this, s; the newest one wins.
 REASON_INTERVAL = 2.0
+#: A reason that stands is said again after this, s, as autopilots do with what keeps them from
+#: arming (ArduPilot: each 30 s): a text is not acknowledged, and a ground station may join late.
+REASON_AGAIN = 30.0
 #: Orders whose end is waited for, at most, and texts that wait to be sent.
 _MOST_ORDERS, _MOST_TEXTS = 32, 8
 _LAST_ID = 65535
@@ -31,6 +34,7 @@ class Announcements:
         self._texts: list[tuple[str, int]] = []
         self._reason = self._said = ""
         self._said_at = -math.inf
+        self._again = False
         #: Token of a request -> what it was.
         self._orders: dict[int, str] = {}
         self._refused: set[int] = set()
@@ -39,8 +43,13 @@ class Announcements:
     def reason(self, text: str) -> None:
         """Why flight is blocked; empty: it is not. Whether it is waits for nothing."""
         if bool(text) != bool(self._reason):
-            self._said_at = -math.inf
+            self._said_at, self._again = -math.inf, False
         self._reason = text
+
+    def reason_stands(self, listened_since: float, now: float) -> None:
+        """It may be said again: who reads it listens since then, monotonic s."""
+        unread = self._said_at < listened_since or now >= self._said_at + REASON_AGAIN
+        self._again |= bool(self._reason) and unread
 
     def say(self, text: str, severity: int = _CRITICAL) -> None:
         """Say this once."""
@@ -74,8 +83,8 @@ class Announcements:
     def take(self, now: float) -> list[Any]:
         """The messages to send now; each is handed out once."""
         texts, self._texts = self._texts, []
-        if self._reason != self._said and now >= self._said_at + REASON_INTERVAL:
-            self._said, self._said_at = self._reason, now
+        if self._reason_due() and now >= self._said_at + REASON_INTERVAL:
+            self._said, self._said_at, self._again = self._reason, now, False
             text = f"{self._said}: flight blocked" if self._said else "flight block released"
             texts.append((text, _WARNING))
         return [part for text, severity in texts for part in self._chunks(text, severity)]
@@ -84,7 +93,10 @@ class Announcements:
         """When there is something to send; infinity: not until more is heard."""
         if self._texts:
             return -math.inf
-        return self._said_at + REASON_INTERVAL if self._reason != self._said else math.inf
+        return self._said_at + REASON_INTERVAL if self._reason_due() else math.inf
+
+    def _reason_due(self) -> bool:
+        return self._reason != self._said or self._again
 
     def _chunks(self, text: str, severity: int) -> list[Any]:
         self._last_id = self._last_id % _LAST_ID + 1

@@ -30,6 +30,7 @@ from chute_ros.links.mavlink.protocol.flight_block import FlightBlock
 from chute_ros.links.mavlink.protocol.kill import KillPlan, kill_plan
 from chute_ros.links.mavlink.protocol.setup_check import Setup, SetupNews, setup_of
 from chute_ros.links.mavlink.protocol.wire import Outbox
+from chute_ros.model import Armed
 from chute_ros.protocol.events import Severity
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.requests import Requests
@@ -96,6 +97,8 @@ class AutopilotCare:
             autopilot.answers.asked(now)
         if autopilot.known_to_answer and autopilot.answers.due(autopilot.liveness.since, now):
             self._requests.commands.send_once(goals.request_heartbeat(autopilot), now)
+        if autopilot.armed is not Armed.ARMED or self.block.stands(autopilot, now):
+            self._announcements.reason_stands(autopilot.liveness.since, now)
         undone = bool(self.block.reason) and self._config.disarm_when_blocked
         for ask in self._heartbeats.due(autopilot, faster, undone, now):
             self._requests.commands.send_once(ask, now)

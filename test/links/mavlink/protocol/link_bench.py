@@ -106,10 +106,10 @@ class Bench:
         self._update()
         return self
 
-    def stream(self, until, every, ids, make):
-        """make() comes from ids again and again."""
+    def stream(self, until, every, ids, *makes):
+        """What each of makes makes comes from ids again and again."""
         while self.t + every <= until + 1e-9:
-            self.at(self.t + every).hear(ids, make())
+            self.at(self.t + every).hear(ids, *(make() for make in makes))
         return self
 
     def _update(self):

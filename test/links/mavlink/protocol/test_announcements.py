@@ -3,7 +3,11 @@
 import pytest
 from link_bench import ASLEEP, Bench, ack, copter, heartbeat, landed, status
 
-from chute_ros.links.mavlink.protocol.announcements import REASON_INTERVAL, Announcements
+from chute_ros.links.mavlink.protocol.announcements import (
+    REASON_AGAIN,
+    REASON_INTERVAL,
+    Announcements,
+)
 from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
@@ -64,6 +68,32 @@ def test_a_reason_is_said_again_only_if_it_changes_and_stays():
     block(bench.at(1.0), "x")
     bench.at(10.0)
     assert bench.texts() == ["x: flight blocked"]
+
+
+def test_a_reason_said_before_the_autopilot_was_there_is_said_again_as_it_comes():
+    bench = block(Bench(**ASLEEP), "x").at(5.0)
+    told = ["x: flight blocked"]
+    assert bench.texts() == told
+    bench.stream(8.0, 0.5, PILOT, copter, landed)
+    assert bench.texts() == told * 2
+    # Lost, and back: it may have missed what was said meanwhile.
+    block(bench.at(18.0), "y")
+    bench.stream(22.0, 0.5, PILOT, copter, landed)
+    assert bench.texts() == told * 2 + ["y: flight blocked"] * 2
+
+
+def test_a_reason_that_stands_is_said_again_on_the_ground_and_not_in_flight():
+    bench = block(Bench(**ASLEEP), "x")
+    bench.stream(3.5 * REASON_AGAIN, 0.5, PILOT, copter, landed)
+    # To nobody, as the autopilot came, and three times.
+    assert bench.texts().count("x: flight blocked") == 5
+    bench.clear()
+    block(bench, "")
+    bench.stream(5.5 * REASON_AGAIN, 0.5, PILOT, copter, landed)
+    assert bench.texts() == ["flight block released"]
+    bench = block(flying(), "x")
+    bench.stream(3.5 * REASON_AGAIN, 0.5, PILOT, lambda: copter(armed=True), lambda: landed(2))
+    assert bench.texts().count("x: flight blocked") == 1
 
 
 def test_a_kill_is_said_when_it_is_ordered_and_when_it_is_confirmed():
