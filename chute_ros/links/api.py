@@ -167,6 +167,8 @@ class LinkKind:
     kit: Place = ""
     #: The ROS package that its executables are in.
     package: str = "chute_ros"
+    #: False: the supervisor does not start with it in kill_links.
+    stops_motors: bool = True
 
 
 def load(place: Place) -> Any:

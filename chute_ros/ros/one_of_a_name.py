@@ -36,7 +36,9 @@ class NameLock:
                 "one a name (-r __node:=NAME), a rank and hot_standby of its own, or end that one"
             ) from None
         except (OSError, ValueError) as error:
-            self.trouble = str(error)
+            # A pipe cannot be read back and forth, which Python says without its path.
+            why = getattr(error, "strerror", None) or error
+            self.trouble = f"{path}: {why}; let this user write a plain file there"
 
     def close(self) -> None:
         """Others may have the name. The file stays: who removed it would take it from another."""

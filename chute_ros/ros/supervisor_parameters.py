@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.registered import links
 from chute_ros.protocol.vehicle_merge import MAVROS, VEHICLE_STATE
 from chute_ros.ros.black_box_parameters import BlackBoxSettings
 from chute_ros.ros.profile_files import load_profile
@@ -69,6 +70,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
     """The settings of the core; ParameterError where two parameters contradict each other,
     ProfileError with every mistake of the profile."""
     given = settings_from(SupervisorParameters, values)
+    _stop_motors(given.config.kill_links)
     config = replace(
         given.config,
         unmonitored_links=tuple(_given(given.unmonitored_links)),
@@ -103,6 +105,17 @@ def lease_from(values: Mapping[str, Any], config: SupervisorConfig, name: str) -
     """Which part this supervisor has among several. name: of its node."""
     deaf_after = max(config.limits(link).lost_after for link in config.links)
     return replace(settings_from(LeaseConfig, values), name=name, deaf_after=deaf_after)
+
+
+def _stop_motors(names: Sequence[str]) -> None:
+    # One that is not registered may stop them, and is known only when it is heard.
+    for name in names:
+        if name in links() and not links()[name].stops_motors:
+            able = ", ".join(one for one, kind in links().items() if kind.stops_motors)
+            raise ParameterError(
+                f"parameter kill_links is {list(names)}: {name} stops no motors; need links that "
+                f"do ({able})"
+            )
 
 
 def _given(texts: Sequence[str]) -> list[str]:

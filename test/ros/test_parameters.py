@@ -63,6 +63,8 @@ BAD = [
     (SUPERVISOR, "required_links", "mavlink_parachute", "a list of texts"),
     (SUPERVISOR, "required_links", [1, 2], "a list of texts"),
     (SUPERVISOR, "kill_links", [""], "need at least one link's name"),
+    (SUPERVISOR, "kill_links", ["upf_can"], "upf_can stops no motors; need links that do"),
+    (SUPERVISOR, "kill_links", [MAVLINK, "relay"], "relay stops no motors"),
     (SUPERVISOR, "heartbeat_lost_after", 0.0, "from 0.05 to 600"),
     (SUPERVISOR, "deploy_timeout", NAN, "from 0.1 to 60"),
 ]

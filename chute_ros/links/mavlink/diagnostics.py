@@ -24,6 +24,7 @@ READABLE = (
     "frames with our own system and component id",
     "acknowledgements for another component",
     "duplicate acknowledgements",
+    "duplicate heartbeats",
 )
 
 

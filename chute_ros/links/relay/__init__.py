@@ -45,4 +45,5 @@ LINK = LinkKind(
     simulators=_simulators,
     connection=lambda sockets: f"serial:{sockets.terminal}",
     part=f"{_FOLDER}.virtual:RelayPart",
+    stops_motors=False,
 )

@@ -65,4 +65,5 @@ LINK = LinkKind(
     part=f"{_FOLDER}.virtual:UpfPart",
     device="upf",
     kit=f"{_FOLDER}.kit:KIT",
+    stops_motors=False,
 )

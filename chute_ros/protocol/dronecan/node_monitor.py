@@ -20,15 +20,14 @@ _ASK_INTERVAL = 1.0
 _MOST_QUESTIONS = 5
 #: Two starts that lie closer than this (s) are one: NodeStatus counts whole seconds.
 _SAME_START = 2.5
-#: A sign of two nodes under one id holds for this time (s), or for so many of the times between
-#: two signs: what comes slowly must not seem over in between.
-_CONFLICT_WINDOW = 5.0
-_CONFLICT_GAPS = 2.5
+#: A sign of two nodes under one id holds for this time (s): no sign disproves it, and of two that
+#: are asked who they are, each other answer may be lost. If nobody speaks, it is over at once.
+_CONFLICT_HOLDS = 30.0
 _MOST_CLOCKS = 4
 #: Signs and clocks that lie further apart (s) have nothing to do with each other; nor have unique
 #: ids, as a node with two is asked each second.
 _MEMORY, _UNIQUE_ID_MEMORY = 60.0, 12.0
-#: So many NodeStatus within this time (s) that count backwards: two nodes count, each for itself.
+#: So many NodeStatus within this time (s) that do not count on: two nodes count, each for itself.
 _MOST_BACKWARDS = 3
 _BACKWARDS_WITHIN = 10.0
 #: Between two questions to a node that is known (s): another one may have come in its place.
@@ -57,12 +56,11 @@ class NodeEntry:
     #: How often it was asked; one more once it did not answer the last time.
     questions: int = 0
     asked: float = -math.inf
-    conflict_heard: float = -math.inf
     conflict_until: float = -math.inf
     #: Heard under this id, the newest last.
     clocks: list[_Clock] = field(default_factory=list)
     unique_ids: dict[bytes, float] = field(default_factory=dict)
-    #: Of the newest NodeStatus, and when one counted backwards.
+    #: Of the newest NodeStatus, and when one did not count on.
     transfer_id: int = -1
     backwards: list[float] = field(default_factory=list)
 
@@ -95,10 +93,7 @@ class NodeEntry:
 
     def conflict_shows(self, now: float) -> None:
         """A sign that two nodes use this id."""
-        gap = now - self.conflict_heard
-        holds = _CONFLICT_GAPS * gap if gap < _MEMORY else 0.0
-        self.conflict_heard = now
-        self.conflict_until = max(self.conflict_until, now + max(_CONFLICT_WINDOW, holds))
+        self.conflict_until = now + _CONFLICT_HOLDS
 
 
 class NodeMonitor:
@@ -122,9 +117,9 @@ class NodeMonitor:
         if entry is None or not entry.alive(now):
             entry = self._nodes[node_id] = NodeEntry(node_id, now)
         entry.heard = now
-        backwards = 0 < (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
+        backwards = (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
         if backwards and -1 not in (entry.transfer_id, transfer_id):
-            self._counts_backwards(entry, values["uptime_sec"], now)
+            self._does_not_count_on(entry, values["uptime_sec"], now)
         entry.uptime, entry.transfer_id = values["uptime_sec"], transfer_id
         self._watch_start(entry, now)
 
@@ -238,7 +233,7 @@ class NodeMonitor:
         return [e for e in self._nodes.values() if e.alive(now)]
 
     @staticmethod
-    def _counts_backwards(entry: NodeEntry, uptime: int, now: float) -> None:
+    def _does_not_count_on(entry: NodeEntry, uptime: int, now: float) -> None:
         if uptime < entry.uptime:
             return  # it started anew, or its clock says already that there are two
         entry.backwards = [*(at for at in entry.backwards if now - at < _BACKWARDS_WITHIN), now]

@@ -34,8 +34,8 @@ _HIGHEST_PRIORITY = 31
 #: Longer would make a device that restarted, and counts from 0 again, go unheard.
 _OVERTAKEN = 0.1
 _REMEMBERED = 8
-#: uavcan.protocol.NodeStatus. Each is heard, however late: that two nodes have one id, and count
-#: apart from each other, shows in their uptimes.
+#: uavcan.protocol.NodeStatus. Each is heard, however late: that two nodes have one id shows in
+#: their uptimes, and where those and their transfer ids are the same in how often they come.
 _NODE_STATUS = 341
 
 
@@ -136,10 +136,10 @@ class _Session:
     #: (transfer id, when) of the newest complete transfers.
     done: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
 
-    def came_before(self, transfer_id: int, now: float) -> bool:
-        """It is one of the newest complete ones again."""
+    def came_before(self, transfer_id: int, within: float, now: float) -> bool:
+        """It is one of the newest complete ones again; the very newest, within so many s."""
         if self.done and self.done[-1][0] == transfer_id:
-            return now - self.done[-1][1] < TRANSFER_TIMEOUT
+            return now - self.done[-1][1] < within
         return any(one == transfer_id and now - at < _OVERTAKEN for one, at in self.done)
 
     def is_old_news(self, transfer_id: int, now: float) -> bool:
@@ -197,7 +197,8 @@ class Assembler:
         tail, chunk = frame.data[-1], frame.data[:-1]
         same = session.transfer_id == head.transfer_id and now - session.heard < TRANSFER_TIMEOUT
         if tail & START:
-            if session.came_before(head.transfer_id, now):
+            within = _OVERTAKEN if head.type_id == _NODE_STATUS else TRANSFER_TIMEOUT
+            if session.came_before(head.transfer_id, within, now):
                 # A device that has just started counts from 0 again; what it says then differs.
                 newest = session.done[-1][0] == head.transfer_id
                 anew = newest and tail & END and session.said not in (b"", chunk)

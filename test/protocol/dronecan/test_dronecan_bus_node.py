@@ -201,9 +201,22 @@ def test_trouble_two_nodes_under_one_id():
         bench.at(tick * 1.0).hear(33, NODE_STATUS, uptime_sec=500 + tick)
         bench.at(tick + 0.5).hear(33, NODE_STATUS, uptime_sec=7 + tick)
     assert bench.node.troubles() == ["two nodes use node id 33: give one of them another"]
-    for tick in range(4, 12):
+    # One of them goes.
+    for tick in range(4, 36):
         bench.at(tick * 1.0).hear(33, NODE_STATUS, uptime_sec=500 + tick)
     story_of(bench, "two nodes use node id 33")
+
+
+def test_trouble_two_nodes_that_were_switched_on_together_and_count_in_step():
+    """Given two with the same uptimes and numbers, of which each is heard half a second after the
+    other, and one whose frames come twice."""
+    bench = Bench()
+    for tick in range(12):
+        for node_id, begin, again in ((33, tick, tick + 0.5), (40, tick + 0.6, tick + 0.65)):
+            bench.speaker(node_id).broadcast(NODE_STATUS, {"uptime_sec": tick})
+            frames = bench.speaker(node_id).take_output()
+            bench.at(begin).feed(*frames).at(again).feed(*frames)
+    assert bench.node.troubles() == ["two nodes use node id 33: give one of them another"]
 
 
 def test_trouble_somebody_uses_our_node_id():

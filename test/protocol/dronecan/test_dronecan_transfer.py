@@ -157,10 +157,15 @@ def test_what_is_doubled_late_or_cut_short_comes_out_once_or_not_at_all():
 
 def test_an_id_that_comes_round_again_is_new_after_the_time_out_or_after_others():
     ear = Ear()
-    transfer, frames = single()
+    transfer, frames = information()
     assert ear.hear(frames, 0.0) == [transfer]
     assert ear.hear(frames, 1.999) == []
     assert ear.hear(frames, 2.0) == [transfer]
+    # Of a NodeStatus, sooner: two nodes may count in step.
+    transfer, frames = single()
+    assert ear.hear(frames, 0.0) == [transfer]
+    assert ear.hear(frames, 0.099) == []
+    assert ear.hear(frames, 0.1) == [transfer]
     # A sender at 100 Hz is through its 32 ids in a third of a second.
     sent = [single(transfer_id=index % TRANSFER_IDS) for index in range(100)]
     heard = [ear.hear(frames, 10.0 + index / 100) for index, (_, frames) in enumerate(sent)]

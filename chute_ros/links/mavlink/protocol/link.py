@@ -297,6 +297,8 @@ class MavlinkLink:
             self._care.authorize(ids, now)
         else:
             copy = message.get_type() == "HEARTBEAT" and self._heartbeats.is_copy(frame, now)
+            if copy:
+                self.counts["duplicate heartbeats"] += 1
             if self._devices.heard(message, ids, now, copy):
                 self.requests.commands.restarted(*ids, now)
         self.requests.effects_may_show(now)

@@ -251,6 +251,21 @@ def test_a_heartbeat_with_the_number_of_an_earlier_one_is_no_copy_of_it(frames, 
         assert state.armed_age < 0.1, f"{second} s"
 
 
+def test_a_copy_of_a_heartbeat_tells_nothing_new_and_is_counted():
+    """Given two routes to one autopilot, of which one takes two seconds."""
+    bench, late = Bench(), []
+    for second in range(6):
+        late.append(bench.encoder(PILOT).encode(copter(armed=second < 3), bench.now))
+        bench.at(float(second)).link.receive(late[-1], bench.now)
+        bench.at(second + 0.5)
+        if second >= 2:
+            bench.link.receive(late[second - 2], bench.now)
+        state = bench.link.vehicle_state(bench.now)
+        assert state.armed is (Armed.ARMED if second < 3 else Armed.DISARMED)
+        assert state.armed_age == pytest.approx(0.5)
+    assert bench.link.counts["duplicate heartbeats"] == 4
+
+
 def test_link_comes_up_falls_silent_and_comes_back_and_restarts_are_told():
     # Link comes up falls silent and comes back.
     bench = Bench().hear(CHUTE, heartbeat()).at(6.0).hear(CHUTE, heartbeat())
