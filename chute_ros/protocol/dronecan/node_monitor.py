@@ -14,8 +14,8 @@ from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS
 
 #: Silent for longer is gone (uavcan.protocol.NodeStatus.OFFLINE_TIMEOUT_MS), s.
 OFFLINE_TIMEOUT = 3.0
-#: A node that does not tell who it is is asked again after this (s), and taken as it is after so
-#: many questions.
+#: Each node is asked who it is after this (s), so many times: of two with one id that were
+#: switched on together either may answer. One that never does is taken as it is then.
 _ASK_INTERVAL = 1.0
 _MOST_QUESTIONS = 5
 #: Two starts that lie closer than this (s) are one: NodeStatus counts whole seconds.
@@ -53,7 +53,7 @@ class NodeEntry:
     uptime: int = 0
     restarts: int = 0
     information: Mapping[str, Any] | None = None
-    #: How often it was asked; one more once it did not answer the last time.
+    #: How often it was asked; of one that never answered, one more once its time is over.
     questions: int = 0
     asked: float = -math.inf
     conflict_until: float = -math.inf
@@ -147,8 +147,7 @@ class NodeMonitor:
             if now < entry.asked + self._ask_interval(entry):
                 continue
             entry.asked = now
-            if entry.information is None:
-                entry.questions += 1
+            entry.questions += 1
             if entry.information is not None or not entry.discovered:
                 due.append(entry.node_id)
         return due
@@ -156,8 +155,10 @@ class NodeMonitor:
     @staticmethod
     def _ask_interval(entry: NodeEntry) -> float:
         """Infinity: it is not asked any more."""
+        if entry.questions <= _MOST_QUESTIONS:
+            return _ASK_INTERVAL
         if entry.information is None:
-            return math.inf if entry.discovered else _ASK_INTERVAL
+            return math.inf
         return _ASK_INTERVAL if len(entry.unique_ids) > 1 else _ASK_AGAIN
 
     def next_deadline(self) -> float:

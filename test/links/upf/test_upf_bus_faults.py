@@ -1,6 +1,7 @@
 """upf_can on a bus that loses, doubles, spoils and floods."""
 
 import random
+import time
 
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyDecision
@@ -193,7 +194,11 @@ def test_two_devices_with_one_node_id_forbid_take_off_only(bench):
     devices.await_beat(device_healthy=False)
     fly(bench, network)
     devices.await_beat(device_healthy=True)
+    # Both are switched off, and one of them on again.
     bench.unplug(twin)
+    bench.unplug(devices.loop)
+    bench.until(lambda: not network.link.bus.nodes.conflicts(time.monotonic()), "nobody speaks")
+    network.plug(devices.controller, devices.trigger)
     await_well(bench, diagnostics)
 
 

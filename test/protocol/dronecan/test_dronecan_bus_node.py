@@ -150,10 +150,14 @@ def test_a_new_node_is_asked_who_it_is_until_it_answers():
     bench.answer(second, 33, **information(name="com.flyfire.upf"))
     assert bench.node.nodes.get(33).name == "com.flyfire.upf"
     assert bench.node.take_ended() == []
-    for t in (1.0, 2.0, 3.0):
-        bench.at(t).hear(33, NODE_STATUS, uptime_sec=5 + int(t))
-    assert len(bench.requests(GET_NODE_INFO)) == 2
     assert first.transfer_id != second.transfer_id
+    # What it answers ends a question; another node of this id may answer the next one.
+    bench.at(0.9)
+    assert len(bench.requests(GET_NODE_INFO)) == 2
+    bench.at(1.0)
+    third = bench.requests(GET_NODE_INFO)[-1]
+    bench.answer(third, 33, **information(unique_id=bytes(16)))
+    assert bench.node.troubles() == ["two nodes use node id 33: give one of them another"]
 
 
 def test_a_node_that_does_not_answer_is_taken_as_it_is():

@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.protocol.dronecan.node_monitor import OFFLINE_TIMEOUT, NodeMonitor
+from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 
 UID = bytes(range(16))
 
@@ -61,7 +61,8 @@ def test_a_new_node_is_asked_who_it_is_and_known_once_it_answers():
     monitor.information(33, info(), 0.1)
     assert (entry.unique_id, entry.name) == (UID, "org.test.parachute")
     assert monitor.all_discovered(0.1)
-    assert monitor.next_deadline() == OFFLINE_TIMEOUT
+    assert monitor.next_deadline() == 1.0, "it is asked again: another may answer"
+    assert monitor.to_ask(1.0) == [33]
 
 
 def test_a_name_that_is_no_text_is_shown_as_far_as_it_is():
@@ -187,7 +188,7 @@ def test_a_known_node_is_asked_again_and_a_second_unit_is_asked_each_second():
     for tick in range(40):
         answers(monitor, tick, UID)
         asked += [tick for _ in monitor.to_ask(tick)]
-    assert asked == [0, 10, 20, 30]
+    assert asked == [0, 1, 2, 3, 4, 5, 15, 25, 35]
     for tick in range(40, 45):
         answers(monitor, tick, UID, b"\x55" * 16)
         assert monitor.conflicts(tick) == [33]
