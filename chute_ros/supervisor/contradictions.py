@@ -11,7 +11,7 @@ contradict is denied, with the reason:
 - a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
   downwards by 9.8 - f at least);
 - a tilt, where it is carried in full and does not speed up, or in full as it leans and does not
-  sink.
+  sink; and one that leapt while it came down, carried in full, as before.
 
 Only an origin that lives denies: a sensor that is stuck has no noise, one that fails has much of
 it.
@@ -80,6 +80,11 @@ _TOLD_AS_WELL = 0.5
 _FEW, _ON_ITS_SIDE = 4, 0.342
 #: Cosine of 45 degrees: a vehicle that leans less claims no fall.
 _LEANS = 0.7071
+#: An attitude leaps that changes by more than this, degrees, and faster, degrees/s: flips are
+#: flown with 400. What tips over is pulled downwards by what carried it, and soon sinks faster;
+#: what sank with this before, m/s, may have reached the last speed of its fall.
+_LEAP, _LEAPS, _LEAPT_AT_LAST_SPEED = 60.0, 500.0, -8.0
+_LEAPT = "the attitude leapt, and neither its force nor its sink changed since"
 
 
 class Rise(NamedTuple):
@@ -112,17 +117,21 @@ def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
 
 
 def denials(
-    motion: tuple[Moment, ...], barometer: Rise, drop: Drop, before: Mapping[str, str]
+    motion: tuple[Moment, ...],
+    barometer: Rise,
+    drop: Drop,
+    before: Mapping[str, str],
+    jumped: bool,
 ) -> Mapping[str, str]:
     """Measurement -> why what it claims is not so. barometer: of the last second; before: what was
-    denied until now."""
+    denied until now; jumped: the tilt is in doubt as it jumped."""
     denied = {}
     sink = _sink_denied(motion, barometer, drop)
     if why := sink or _still_denied(motion, barometer, before):
         denied[VERTICAL_SPEED] = why
     if why := _fall_denied(motion, barometer):
         denied[ACCELERATION] = why
-    if why := _tilt_denied(motion, barometer):
+    if why := _tilt_denied(motion, barometer) or _leapt(motion, barometer, before, jumped):
         denied[TILT] = why
     return denied
 
@@ -375,6 +384,35 @@ def _sink_by_hand(motion: tuple[Moment, ...], known: list[Moment]) -> float:
     upright = [one[1] for one in motion if one[3] >= _LEANS and not math.isnan(one[1])]
     before = min(0.0, min(upright, default=-_BY_HAND))
     return max(before - _LIES_AND_SINKS, -_BY_HAND)
+
+
+def _leapt(
+    motion: tuple[Moment, ...], barometer: Rise, before: Mapping[str, str], jumped: bool
+) -> str:
+    """Its attitude alone changed, faster than bodies do; nor has anything changed since."""
+    upright = [number for number, one in enumerate(motion) if one[3] >= _LEANS]
+    if upright and upright[-1] == len(motion) - 1:
+        return ""
+    if upright:
+        since = motion[upright[-1] :]
+        leans = [one for one in since[1:] if not math.isnan(one[3])]
+        leapt = _leaps(since[0], leans[0]) if leans else jumped
+    else:
+        since, leapt = motion, before.get(TILT) == _LEAPT
+    known = [one for one in since if not math.isnan(one[1] + one[2])]
+    if not leapt or len(known) < 2 or known[-1] is not motion[-1]:
+        return ""
+    felt, speeds, (least, most) = [one[2] for one in known], [one[1] for one in known], _CARRIED
+    in_full = all(abs(one - GRAVITY) <= _SHAKES for one in felt) and least <= fmean(felt) <= most
+    stays = max(speeds) - min(speeds) <= _SPEEDS_UP and min(speeds) >= _LEAPT_AT_LAST_SPEED
+    told = barometer.rate < max(fmean(speeds) - _SINK_DIFFERS, _LEAPT_AT_LAST_SPEED)
+    lives = max(felt) - min(felt) >= _FORCE_LIVES
+    return _LEAPT if in_full and stays and lives and not told else ""
+
+
+def _leaps(before: Moment, after: Moment) -> bool:
+    turned = math.degrees(math.acos(after[3]) - math.acos(before[3]))
+    return turned > max(_LEAP, _LEAPS * (after[0] - before[0]))
 
 
 def _carried_leaning(motion: tuple[Moment, ...]) -> str:

@@ -172,6 +172,7 @@ def _note_contradictions(turn: Turn) -> None:
         readings.pressure_change(turn.config, state, now),
         readings.pressure_drop(turn.config, state, now),
         state.heard.denied,
+        state.measured(TILT).has_jumped(now),
     )
     if why := _height_denied(turn):
         denied = {**denied, HEIGHT: why}

@@ -23,9 +23,9 @@ def standing(tilt: float) -> tuple[tuple[float, float, float, float], ...]:
 
 @pytest.mark.parametrize("tilt", [0.0, 10.0, 40.0])
 def test_a_tilt_that_tells_of_no_fall_is_not_denied(tilt):
-    assert denials(standing(tilt), STILL, NO_DROP, {}) == {}
+    assert denials(standing(tilt), STILL, NO_DROP, {}, False) == {}
 
 
 @pytest.mark.parametrize("tilt", [50.0, 90.0, 170.0])
 def test_a_tilt_of_a_vehicle_that_is_carried_in_full_is(tilt):
-    assert set(denials(standing(tilt), STILL, NO_DROP, {})) == {TILT}
+    assert set(denials(standing(tilt), STILL, NO_DROP, {}, False)) == {TILT}

@@ -780,3 +780,64 @@ def test_a_person_may_reset_one_that_stands_although_its_estimator_drifts(drifts
     teller.story.at(teller.story.t, i.ResetRequest(10))
     assert teller.story.answer(10).success
     assert not deployed(teller)
+
+
+# -- an attitude that leaps -----------------
+
+
+def coming_down(
+    profile: str, sink: float, lean: float, seconds: float, barometer: bool, force: float = 9.8
+) -> tuple[Teller, float]:
+    """It hovers at 150 m, and comes down with this for so long, as a person flies it: no target
+    is told. The teller, and where it is."""
+    teller, height = told_to(profile), 150.0
+    truth = {"true_height": height} if barometer else {}
+    teller.hover(3.0, height, **truth)
+    for k in range(round(seconds / EVERY)):
+        speed = -min(sink, 4.0 * EVERY * k)
+        height += EVERY * speed
+        felt = force if speed == -sink else 5.8
+        truth = {"true_height": height} if barometer else {}
+        told = {"vertical_speed": speed + teller.noise(0.2), "tilt": lean + teller.noise(1.0)}
+        teller.tell(height=height, **told, force=felt, **truth)
+    return teller, height
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("sink", [3.5, 5.0, 6.9, 7.3])
+@pytest.mark.parametrize("leaps_to", [85.0, 120.0, 158.0, 179.0])
+@pytest.mark.parametrize("barometer", [True, False])
+def test_an_attitude_that_leaps_in_a_descent_with_which_nothing_else_changes_ends_no_flight(
+    profile: str, sink: float, leaps_to: float, barometer: bool
+) -> None:
+    """Given a descent by hand; a sensor that turns over within a tenth of a second. What did so
+    would be pulled downwards by what carried it before."""
+    teller, height = coming_down(profile, sink, 10.0, 4.0, barometer)
+    for _ in range(80):
+        height -= EVERY * sink
+        truth = {"true_height": height} if barometer else {}
+        told = {"vertical_speed": -sink + teller.noise(0.2), "tilt": leaps_to + teller.noise(1.0)}
+        teller.tell(height=height, **told, force=9.8, **truth)
+    assert teller.story.fired() == []
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("sink", [0.0, 5.0, 7.0])
+@pytest.mark.parametrize("turned", [85.0, 120.0, 179.0])
+@pytest.mark.parametrize("thrust", [9.8, 3.0])
+@pytest.mark.parametrize("barometer", [True, False])
+def test_one_that_snaps_over_and_sinks_faster_for_it_is_released(
+    profile: str, sink: float, turned: float, thrust: float, barometer: bool
+) -> None:
+    """Given one that breaks and lies on its side or its back within a tenth of a second; its
+    motors go on, and drag holds it at 25 m/s."""
+    teller, height = coming_down(profile, sink, 10.0, 4.0, barometer)
+    begun, speed = teller.story.t, -sink
+    while not deployed(teller) and teller.story.t < begun + 4.0:
+        drag = 9.8 * (speed / 25.0) ** 2
+        speed += EVERY * (thrust * math.cos(math.radians(turned)) + drag - 9.8)
+        height += EVERY * speed
+        truth = {"true_height": height} if barometer else {}
+        told = {"vertical_speed": speed + teller.noise(0.2), "tilt": turned + teller.noise(1.0)}
+        teller.tell(height=height, **told, force=math.hypot(thrust, drag), **truth)
+    assert teller.story.t - begun <= (1.2 if profile == "multirotor" else 1.8) + EVERY
