@@ -54,6 +54,8 @@ class FlightModel:
     released_for: float = math.nan
     #: Specific force (what an accelerometer measures), m/s^2.
     acceleration: float = GRAVITY
+    #: By which the air pushes it upwards, m/s^2: it moves by that, and feels it.
+    push: float = 0.0
     #: The ground under it, m above where it took off: negative beside a roof, over a valley.
     ground: float = 0.0
     #: How it comes down once its motors have failed while it is armed, and once it is disarmed;
@@ -112,10 +114,10 @@ class FlightModel:
             self.released_for += dt
         way = self.way_down
         if way is None:
-            carried = self._thrust(dt) + self._drag()
+            carried = self._thrust(dt) + self._drag() + self.push
             gained, self.acceleration = carried - GRAVITY, abs(carried)
         else:
-            gained = (-way.sink - self.vertical_speed) / max(way.settles, dt)
+            gained = (-way.sink - self.vertical_speed) / max(way.settles, dt) + self.push
             self.acceleration = max(0.0, way.force + gained)
         self.vertical_speed += gained * dt
         self.height += self.vertical_speed * dt

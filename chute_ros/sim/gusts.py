@@ -20,22 +20,22 @@ class GustyModel(FlightModel):
 
     gusts: float = 0.0
     chance: random.Random = field(default_factory=random.Random)
-    _gust: float = 0.0
     _sway: float = 0.0
 
     def step(self, dt: float) -> None:
         """Move on by dt, 0 to 0.1 s."""
-        if self.gusts and not self.on_ground:
+        if self.on_ground:
+            self.push = 0.0
+        elif self.gusts:
             share = dt / _GUST_TIME
-            push = self.chance.gauss(0.0, self.gusts * math.sqrt(2.0 * share))
-            self._gust += push - self._gust * share
-            self.vertical_speed += self._gust * dt
-            self._sway = _SWAY * self._gust
+            change = self.chance.gauss(0.0, self.gusts * math.sqrt(2.0 * share))
+            self.push += change - self.push * share
+            self._sway = _SWAY * self.push
         super().step(dt)
 
     def calm(self) -> None:
         """The gusts end."""
-        self.gusts = self._gust = self._sway = 0.0
+        self.gusts = self.push = self._sway = 0.0
 
     def _turn(self, dt: float) -> None:
         super()._turn(dt)

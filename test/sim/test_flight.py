@@ -1,12 +1,14 @@
 """The flight model: heights, speeds and times that mean something."""
 
 import math
+import random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chute_ros.sim.flight import GRAVITY, Descent, FlightModel
+from chute_ros.sim.gusts import GustyModel
 
 STEP = 0.02
 
@@ -202,3 +204,19 @@ def test_whatever_happens_it_is_never_below_the_ground_and_never_nowhere(flight,
             assert abs(model.vertical_speed) < 60.0
             assert 0.0 <= model.canopy <= 1.0
             assert abs(model.roll) <= math.pi
+
+
+@pytest.mark.parametrize("failed", [False, True])
+def test_in_gusts_it_feels_what_moves_it(failed):
+    """As a body does: the specific force is what it speeds up with, and its weight."""
+    way = Descent("glide", 4.0)
+    model = GustyModel(gusts=2.0, chance=random.Random(3), armed=True, descent=way)
+    model.height = model.target_height = 300.0
+    model.motors_failed, moved = failed, 0.0
+    for _ in range(500):
+        before = model.vertical_speed
+        model.step(STEP)
+        speeds_up = (model.vertical_speed - before) / STEP
+        assert model.acceleration == pytest.approx(abs(GRAVITY + speeds_up))
+        moved = max(moved, abs(speeds_up))
+    assert moved > 1.0, "the gusts are felt"
