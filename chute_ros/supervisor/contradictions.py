@@ -65,7 +65,7 @@ DIVE, _DIVES = "dive", 15.0
 _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
 #: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
 #: side while it is carried along its axis speeds up by more than this in that time, m/s.
-_FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
+_FLOWN_SINK, _SPEEDS_UP = 7.5, 2.0
 #: One that lies on its side sinks by its barometer's last second with this at least, m/s: half a
 #: second of free fall, and what gusts of an ordinary flight do not reach.
 _LIES_AND_SINKS = 2.5

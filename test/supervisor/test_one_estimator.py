@@ -804,21 +804,25 @@ def coming_down(
 
 
 @AIRCRAFT
-@pytest.mark.parametrize("sink", [3.5, 5.0, 6.9, 7.3])
-@pytest.mark.parametrize("leaps_to", [85.0, 120.0, 158.0, 179.0])
+@pytest.mark.parametrize("sink", [3.5, 5.0, 6.9, 7.2])
+@pytest.mark.parametrize("turns_to", [85.0, 120.0, 158.0, 179.0])
+@pytest.mark.parametrize("rate", [30.0, 200.0, math.inf])
 @pytest.mark.parametrize("barometer", [True, False])
-def test_an_attitude_that_leaps_in_a_descent_with_which_nothing_else_changes_ends_no_flight(
-    profile: str, sink: float, leaps_to: float, barometer: bool
+def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
+    profile: str, sink: float, turns_to: float, rate: float, barometer: bool
 ) -> None:
-    """Given a descent by hand; a sensor that turns over within a tenth of a second. What did so
-    would be pulled downwards by what carried it before."""
-    teller, height = coming_down(profile, sink, 10.0, 4.0, barometer)
-    for _ in range(80):
-        height -= EVERY * sink
-        truth = {"true_height": height} if barometer else {}
-        told = {"vertical_speed": -sink + teller.noise(0.2), "tilt": leaps_to + teller.noise(1.0)}
-        teller.tell(height=height, **told, force=9.8, **truth)
-    assert teller.story.fired() == []
+    """Given a descent by hand; a sensor that turns over, so many degrees each second, or within a
+    tenth of one. What did so would be pulled downwards by what carried it before."""
+    for command in (True, False):
+        (teller, height), tilt = coming_down(profile, sink, 10.0, 4.0, barometer), 10.0
+        for _ in range(70):
+            height -= EVERY * sink
+            tilt = min(turns_to, tilt + EVERY * rate)
+            told = {"true_height": height} if barometer else {}
+            told |= {"attitude_error": tilt - 10.0} if command else {}
+            told |= {"vertical_speed": -sink + teller.noise(0.2), "tilt": tilt + teller.noise(1.0)}
+            teller.tell(height=height, force=9.8, **told)
+        assert teller.story.fired() == [], f"{command=}"
 
 
 @AIRCRAFT

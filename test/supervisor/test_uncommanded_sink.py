@@ -126,9 +126,12 @@ def test_one_that_lies_otherwise_or_flat_or_tells_no_command_is(
     assert story.newest(Action.KILL).rule == ("off its command" if off else "critical sink")
 
 
-def spiral(attitude_error: float, barometer_sinks: bool = True) -> Story:
+def spiral(
+    attitude_error: float, barometer_sinks: bool = True, hovers_from: float = math.inf
+) -> Story:
     """An aeroplane banks to 70 degrees and goes down with 15 m/s after 3 s, at 2.3 times its
-    weight; how far it is from its command, degrees."""
+    weight; how far it is from its command, degrees. Its estimator tells no sink from so long
+    after the start of it, s."""
     story, true, height = Story(shipped("fixed_wing")).ready(), 300.0, 300.0
     for k in range(80):
         t = max(EVERY * (k - 20), 0.0)
@@ -137,6 +140,8 @@ def spiral(attitude_error: float, barometer_sinks: bool = True) -> Story:
         height += EVERY * speed
         bank = min(70.0 * t, 70.0)
         parts = {"height": height, "vertical_speed": speed}
+        if t > hovers_from:
+            parts = {"height": 300.0, "vertical_speed": 0.1 * (k % 3)}
         parts |= {"tilt": bank + 0.1 * (k % 3), "attitude_error": min(attitude_error, bank)}
         turns = bool(t) and barometer_sinks
         parts["acceleration"] = (22.0 if turns else 9.8) + 0.1 * (k % 3)
@@ -154,6 +159,14 @@ def test_an_aeroplane_that_is_far_from_its_command_and_sinks_is_deployed_before_
     assert story.fired() == ["KILL"]
     assert story.newest(Action.KILL).rule == "off its command"
     assert story.when(Action.KILL) - 2.0 < 3.0
+
+
+@pytest.mark.parametrize("hovers_from", [0.0, 1.9])
+def test_so_is_one_whose_estimator_tells_no_sink(hovers_from: float) -> None:
+    story = spiral(attitude_error=68.0, hovers_from=hovers_from)
+    assert story.fired() == ["KILL"]
+    assert story.newest(Action.KILL).rule == "off its command"
+    assert story.when(Action.KILL) - 2.0 < 3.5
 
 
 @pytest.mark.parametrize(
