@@ -63,8 +63,9 @@ DIVE, _DIVES = "dive", 15.0
 #: Carried in full: on the average between these, m/s^2, for so long, s, each so near to gravity,
 #: m/s^2, as motors shake.
 _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
-#: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
-#: side while it is carried along its axis speeds up by more than this in that time, m/s.
+#: Faster than that it may have reached the last speed of its fall, m/s (7 are flown down, and told
+#: with noise); and one that lies on its side while it is carried along its axis speeds up by more
+#: than this in that time, m/s.
 _FLOWN_SINK, _SPEEDS_UP = 7.5, 2.0
 #: One that lies on its side sinks by its barometer's last second with this at least, m/s: half a
 #: second of free fall, and what gusts of an ordinary flight do not reach.

@@ -804,8 +804,8 @@ def coming_down(
 
 
 @AIRCRAFT
-@pytest.mark.parametrize("sink", [3.5, 5.0, 6.9, 7.2])
-@pytest.mark.parametrize("turns_to", [85.0, 120.0, 158.0, 179.0])
+@pytest.mark.parametrize("sink", [3.5, 7.2])
+@pytest.mark.parametrize("turns_to", [85.0, 179.0])
 @pytest.mark.parametrize("rate", [30.0, 200.0, math.inf])
 @pytest.mark.parametrize("barometer", [True, False])
 def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
@@ -826,8 +826,8 @@ def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
 
 
 @AIRCRAFT
-@pytest.mark.parametrize("sink", [0.0, 5.0, 7.0])
-@pytest.mark.parametrize("turned", [85.0, 120.0, 179.0])
+@pytest.mark.parametrize("sink", [0.0, 7.0])
+@pytest.mark.parametrize("turned", [85.0, 179.0])
 @pytest.mark.parametrize("thrust", [9.8, 3.0])
 @pytest.mark.parametrize("barometer", [True, False])
 def test_one_that_snaps_over_and_sinks_faster_for_it_is_released(
