@@ -56,22 +56,6 @@ def test_an_aeroplane_that_was_killed_glides_or_dives(sink: float, deploys: bool
         assert story.when(D) - 2.05 < 3.0
 
 
-@pytest.mark.parametrize(("lean", "soon"), [(78.0, 1.7), (30.0, 2.3)])
-def test_one_that_leans_over_meanwhile_is_not_waited_for_until_its_heights_tell(
-    lean: float, soon: float
-) -> None:
-    """Given an aeroplane that was killed low, and goes down in a spiral (campaign 1280002479)."""
-    story, off = killed("fixed_wing", 120.0), {"armed": Armed.DISARMED}
-    sinking, height = 0.0, 120.0
-    for step in range(60):
-        sinking = min(sinking + 0.3, 14.0)
-        height -= 0.05 * sinking
-        told = {"vertical_speed": -sinking, "height": height, "tilt": min(4.0 * step, lean)}
-        story.fly(story.t + 0.05, acceleration=18.0, **told, **off)
-    assert story.newest(D).rule == "killed and falling"
-    assert soon - 0.4 < story.when(D) - 2.05 < soon
-
-
 def test_a_person_may_ask_for_the_kill_alone() -> None:
     story = killed("multirotor", 50.0, kill_only=True).fly(2.3)
     off = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
