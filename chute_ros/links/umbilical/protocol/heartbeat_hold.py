@@ -12,8 +12,10 @@ import math
 from chute_ros.links.umbilical.protocol.config import HeartbeatInFlight
 from chute_ros.links.umbilical.protocol.layouts import Layout
 
-#: A <L> that has left may have begun a flight that telemetry does not show yet, s.
-_LAUNCH_SHOWS = 1.0
+#: A <L> that has left may have begun a flight that telemetry does not show yet, s; and where none
+#: can be read, as beside a second reader of the port, for so long: the firmware takes the
+#: umbilical for lost after 15 s without <H>.
+_LAUNCH_SHOWS, _LAUNCH_MAY_BE_UNSEEN = 1.0, 10.0
 #: So many records in a row say that it flies: one may be damaged, and on the ground a missing <H>
 #: has the tank vented.
 _FLIES = 2
@@ -25,22 +27,32 @@ class HeartbeatHold:
     def __init__(self, setting: HeartbeatInFlight) -> None:
         self._setting = setting
         self._records_in_flight = 0
-        self._launch_sent = -math.inf
+        #: When telemetry shows what became of a <L>, and when it is no longer waited for.
+        self._launch_shows, self._launch_over = math.inf, -math.inf
 
-    def record(self, flying: bool) -> None:
+    def record(self, flying: bool, now: float) -> None:
         """A record came, by which it flies or not."""
         self._records_in_flight = self._records_in_flight + 1 if flying else 0
+        if not flying and now >= self._launch_shows:
+            self._launch_over = -math.inf
 
     def token_sent(self, name: str, now: float) -> None:
         """This command leaves."""
         if name == "launch":
-            self._launch_sent = now
+            self._launch_shows = now + _LAUNCH_SHOWS
+            self._launch_over = now + _LAUNCH_MAY_BE_UNSEEN
 
     def holds(self, layout: Layout | None, now: float) -> bool:
         """None may be sent now. layout: of the telemetry; None: not recognised yet."""
+        if now >= self._launch_over:
+            self._launch_over = -math.inf
         by_layout = layout is not None and layout.heartbeat_in_flight
         auto = self._setting is HeartbeatInFlight.AUTO
         if self._setting is HeartbeatInFlight.YES or (auto and by_layout):
             return False
-        launches = now < self._launch_sent + _LAUNCH_SHOWS
+        launches = self._launch_over > -math.inf
         return launches or self._records_in_flight >= _FLIES
+
+    def next_deadline(self) -> float:
+        """When time alone lets them go on; infinity: it does not."""
+        return self._launch_over if self._launch_over > -math.inf else math.inf

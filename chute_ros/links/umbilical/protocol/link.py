@@ -120,7 +120,7 @@ class UmbilicalLink(EventLog):
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
-        parts = (self.memory, self.computer, self._requests)
+        parts = (self.memory, self.computer, self._requests, self._hold)
         return min(part.next_deadline() for part in parts)
 
     def not_written(self, token: bytes) -> None:
@@ -283,7 +283,7 @@ class UmbilicalLink(EventLog):
             where = " IN FLIGHT" if self.computer.restarted_in_flight else ""
             self.notice(Severity.ERROR, f"flight computer restarted{where}")
             self.memory.restarted()
-        self._hold.record(self.computer.flying)
+        self._hold.record(self.computer.flying, now)
         self.memory.telemetry(now)
         self._changed(changes)
         self._events.append(TelemetryReceived(record, self.computer.records))

@@ -25,6 +25,8 @@ class Flight:
         self.link = UmbilicalLink(UmbilicalConfig(heartbeat_in_flight=setting), list(layouts))
         self.link.owner_alive(float("inf"))
         self.modes = []
+        #: Another reader takes from the port what the computer sends.
+        self.robbed = False
         self.now = START
         self.link.wire_opened(self.now)
 
@@ -36,7 +38,8 @@ class Flight:
             self.now += 0.01
             self.computer.update(self.now)
             for data in self.computer.take_output():
-                self.link.receive(data, self.now, "port")
+                if not self.robbed:
+                    self.link.receive(data, self.now, "port")
             self.link.update(self.now)
             for token in self.link.take_output():
                 self.computer.receive(token, self.now)
@@ -65,6 +68,31 @@ def test_by_default_the_flight_goes_on_to_the_main():
         ComputerMode.DrogueDeployed,
         ComputerMode.MainDeployed,
     ]
+
+
+@pytest.mark.parametrize("seconds", [1.5, 4.0])
+def test_where_no_record_can_be_read_after_the_launch_none_is_sent(seconds):
+    """Given a second reader of the port, for so long."""
+    flight = Flight(HeartbeatInFlight.AUTO).launched()
+    flight.until(lambda: flight.computer.mode is ComputerMode.Ascent)
+    flight.robbed, begun = True, flight.now
+    flight.until(lambda: flight.now > begun + seconds)
+    flight.robbed = False
+    flight.until(lambda: flight.computer.mode in (ComputerMode.MainDeployed, ComputerMode.Fault))
+    assert flight.computer.mode is ComputerMode.MainDeployed
+
+
+def test_after_a_launch_that_came_to_nothing_they_go_on():
+    story = Bench(always_alive=True).talk(flight_mode=STANDBY).at(5.0)
+    story.link.command(1, "launch", True, story.now)
+    story.at(20.0)
+    assert beats(story, 6.5, 20.0) >= 12
+    # Nor is its tank vented for long silence.
+    story = Bench(always_alive=True).talk(flight_mode=STANDBY).at(5.0)
+    story.link.command(1, "launch", True, story.now)
+    story.silent().at(40.0)
+    assert beats(story, 5.5, 14.9) == 0
+    assert beats(story, 15.0, 20.0) >= 4
 
 
 def test_with_heartbeats_in_flight_such_a_firmware_goes_to_fault():
