@@ -25,6 +25,7 @@ LINK = replace(
     node="other_link.node:Node",
     argument=ConnectionArgument("motor", "of a rocket"),
     package="other_package",
+    stops_motors=True,
     vehicles=(VEHICLE,),
 )
 """
