@@ -70,7 +70,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
     """The settings of the core; ParameterError where two parameters contradict each other,
     ProfileError with every mistake of the profile."""
     given = settings_from(SupervisorParameters, values)
-    _stop_motors(given.config.kill_links)
+    _check_kill_links(given.config.kill_links)
     config = replace(
         given.config,
         unmonitored_links=tuple(_given(given.unmonitored_links)),
@@ -107,7 +107,7 @@ def lease_from(values: Mapping[str, Any], config: SupervisorConfig, name: str) -
     return replace(settings_from(LeaseConfig, values), name=name, deaf_after=deaf_after)
 
 
-def _stop_motors(names: Sequence[str]) -> None:
+def _check_kill_links(names: Sequence[str]) -> None:
     # One that is not registered may stop them, and is known only when it is heard.
     for name in names:
         if name in links() and not links()[name].stops_motors:

@@ -232,7 +232,7 @@ def felt_fall(motion: tuple[Moment, ...]) -> float:
     """The same of a fall that its estimator hides: one that it told as well is none, as what
     became of it since, it tells, too. An accelerometer that is stuck feels none."""
     fell = [one[2] for one in motion if one[2] < FREE_FALL]
-    if len(fell) < 3 or max(fell) - min(fell) < _FORCE_LIVES:
+    if len(fell) < 3 or not _lives(fell):
         return 0.0
     felt = _felt(motion)
     changes = [after[1] - before[1] for before, after, _ in _drops(motion)]
@@ -391,24 +391,22 @@ def _leapt(
     motion: tuple[Moment, ...], barometer: Rise, before: Mapping[str, str], jumped: bool
 ) -> str:
     """Its attitude alone changed, faster than bodies do; nor has anything changed since."""
-    upright = [number for number, one in enumerate(motion) if one[3] >= _LEANS]
-    if upright and upright[-1] == len(motion) - 1:
+    if not motion or motion[-1][3] >= _LEANS:
         return ""
-    if upright:
-        since = motion[upright[-1] :]
+    upright = max((n for n, one in enumerate(motion) if one[3] >= _LEANS), default=-1)
+    since = motion[max(upright, 0) :]
+    if upright < 0:
+        leapt = before.get(TILT) == _LEAPT
+    else:
         leans = [one for one in since[1:] if not math.isnan(one[3])]
         leapt = _leaps(since[0], leans[0]) if leans else jumped
-    else:
-        since, leapt = motion, before.get(TILT) == _LEAPT
     known = [one for one in since if not math.isnan(one[1] + one[2])]
     if not leapt or len(known) < 2 or known[-1] is not motion[-1]:
         return ""
-    felt, speeds, (least, most) = [one[2] for one in known], [one[1] for one in known], _CARRIED
-    in_full = all(abs(one - GRAVITY) <= _SHAKES for one in felt) and least <= fmean(felt) <= most
+    felt, speeds = [one[2] for one in known], [one[1] for one in known]
     stays = max(speeds) - min(speeds) <= _SPEEDS_UP and min(speeds) >= _LEAPT_AT_LAST_SPEED
     told = barometer.rate < max(fmean(speeds) - _SINK_DIFFERS, _LEAPT_AT_LAST_SPEED)
-    lives = max(felt) - min(felt) >= _FORCE_LIVES
-    return _LEAPT if in_full and stays and lives and not told else ""
+    return _LEAPT if stays and not told and _lives(felt) and _in_full(felt) else ""
 
 
 def _leaps(before: Moment, after: Moment) -> bool:
@@ -435,11 +433,19 @@ def _carried(motion: tuple[Moment, ...], leaning: bool = False) -> list[Moment]:
         return []
     if leaning and min(one[3] for one in known) < _ON_ITS_SIDE:
         return []
-    felt, (least, most) = [one[2] for one in known], _CARRIED
-    lives = max(felt) - min(felt) >= _FORCE_LIVES
+    felt = [one[2] for one in known]
     forces = [one[2] * one[3] for one in known] if leaning else felt
-    in_full = all(abs(force - GRAVITY) <= _SHAKES for force in forces)
-    return known if in_full and lives and least <= fmean(forces) <= most else []
+    return known if _lives(felt) and _in_full(forces) else []
+
+
+def _in_full(forces: list[float]) -> bool:
+    least, most = _CARRIED
+    near = all(abs(force - GRAVITY) <= _SHAKES for force in forces)
+    return near and least <= fmean(forces) <= most
+
+
+def _lives(felt: list[float]) -> bool:
+    return max(felt) - min(felt) >= _FORCE_LIVES
 
 
 def _speed_lives(motion: tuple[Moment, ...]) -> bool:

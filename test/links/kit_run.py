@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Self
 
-from chute_ros.conformance.clause import Result, Risk, Verdict
-from chute_ros.conformance.kit import Kit
-from chute_ros.conformance.session import Allowed, Ended, Session
+from chute_ros.conformance.clause import Result, Verdict
+from chute_ros.conformance.session import Ended, Session
 from chute_ros.conformance.virtual import VirtualLine
 
 
@@ -25,33 +24,6 @@ def problem(line: VirtualLine) -> str:
     """How it ended."""
     (ended,) = (one for one in line.events if isinstance(one, Ended))
     return ended.problem
-
-
-def fails_in(kit: Kit, name: str) -> None:
-    """A simulated device that breaks this clause fails in it, by itself, or with all others where
-    it takes what they have done."""
-    (clause,) = (one for one in kit.clauses if one.name == name)
-    device, bench = kit.simulated(name, clause.needs)
-    allowed = Allowed(Risk.FIRES, clause.needs.split())
-    line = VirtualLine(Session(bench, (clause,), allowed), device)
-    line.run()
-    if of(line, Verdict.FAILED) == [name]:
-        _is_shown(results(line)[name])
-    else:
-        fails_in_no_other(kit, name)
-
-
-def fails_in_no_other(kit: Kit, name: str) -> None:
-    """The same with all clauses, which takes long."""
-    line = kit.virtual(name)
-    line.run()
-    assert of(line, Verdict.FAILED) == [name]
-    _is_shown(results(line)[name])
-
-
-def _is_shown(result: Result) -> None:
-    assert result.why
-    assert result.proof, "packets that show it"
 
 
 class KitRun:

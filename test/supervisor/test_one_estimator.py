@@ -785,20 +785,18 @@ def test_a_person_may_reset_one_that_stands_although_its_estimator_drifts(drifts
 # -- an attitude that leaps -----------------
 
 
-def coming_down(
-    profile: str, sink: float, lean: float, seconds: float, barometer: bool, force: float = 9.8
-) -> tuple[Teller, float]:
-    """It hovers at 150 m, and comes down with this for so long, as a person flies it: no target
-    is told. The teller, and where it is."""
+def coming_down(profile: str, sink: float, barometer: bool) -> tuple[Teller, float]:
+    """It hovers at 150 m, and comes down with this for 4 s, as a person flies it: no target is
+    told. The teller, and where it is."""
     teller, height = told_to(profile), 150.0
     truth = {"true_height": height} if barometer else {}
     teller.hover(3.0, height, **truth)
-    for k in range(round(seconds / EVERY)):
+    for k in range(round(4.0 / EVERY)):
         speed = -min(sink, 4.0 * EVERY * k)
         height += EVERY * speed
-        felt = force if speed == -sink else 5.8
+        felt = 9.8 if speed == -sink else 5.8
         truth = {"true_height": height} if barometer else {}
-        told = {"vertical_speed": speed + teller.noise(0.2), "tilt": lean + teller.noise(1.0)}
+        told = {"vertical_speed": speed + teller.noise(0.2), "tilt": 10.0 + teller.noise(1.0)}
         teller.tell(height=height, **told, force=felt, **truth)
     return teller, height
 
@@ -814,7 +812,7 @@ def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
     """Given a descent by hand; a sensor that turns over, so many degrees each second, or within a
     tenth of one. What did so would be pulled downwards by what carried it before."""
     for command in (True, False):
-        (teller, height), tilt = coming_down(profile, sink, 10.0, 4.0, barometer), 10.0
+        (teller, height), tilt = coming_down(profile, sink, barometer), 10.0
         for _ in range(70):
             height -= EVERY * sink
             tilt = min(turns_to, tilt + EVERY * rate)
@@ -835,7 +833,7 @@ def test_one_that_snaps_over_and_sinks_faster_for_it_is_released(
 ) -> None:
     """Given one that breaks and lies on its side or its back within a tenth of a second; its
     motors go on, and drag holds it at 25 m/s."""
-    teller, height = coming_down(profile, sink, 10.0, 4.0, barometer)
+    teller, height = coming_down(profile, sink, barometer)
     begun, speed = teller.story.t, -sink
     while not deployed(teller) and teller.story.t < begun + 4.0:
         drag = 9.8 * (speed / 25.0) ** 2

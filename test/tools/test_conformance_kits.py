@@ -25,14 +25,16 @@ from chute_ros.links.registered import links
 
 KITS: dict[str, Kit] = {one.device: load(one.kit) for one in links().values() if one.kit}
 ALONE = [(device, clause) for device, kit in KITS.items() for clause in kit.clauses]
+IN_REACH = [(device, clause) for device, clause in ALONE if not clause.out_of_reach]
 
 
 def tried(
-    device: str, clauses: Sequence[Clause[object]], needs: str
+    device: str, clauses: Sequence[Clause[object]], needs: str, broken: str = ""
 ) -> tuple[list[Result], Sequence[Packet]]:
-    """Of a sound device with these options and all risks: results, and the whole traffic."""
-    sound, bench = KITS[device].simulated("", needs or SOAK)
-    line = VirtualLine(Session(bench, clauses, Allowed(Risk.FIRES, needs.split())), sound)
+    """Of a device that breaks this clause (empty: a sound one) with these options and all risks:
+    results, and the whole traffic."""
+    simulated, bench = KITS[device].simulated(broken, needs or SOAK)
+    line = VirtualLine(Session(bench, clauses, Allowed(Risk.FIRES, needs.split())), simulated)
     line.run()
     return [one for one in line.events if isinstance(one, Result)], bench.traffic
 
@@ -47,6 +49,34 @@ def test_a_clause_that_is_tried_alone_does_not_fail_a_sound_device(
     (result,), _ = tried(device, [clause], clause.needs)
     assert result.verdict in (Verdict.PASSED, Verdict.NOT_TRIED), result.why
     assert result.proof or result.verdict is Verdict.NOT_TRIED
+
+
+@pytest.mark.parametrize(
+    ("device", "clause"), IN_REACH, ids=[f"{device}-{one.name}" for device, one in IN_REACH]
+)
+def test_a_device_that_breaks_a_clause_fails_in_it(device: str, clause: Clause[object]) -> None:
+    """By itself, or with all others where it takes what they have done."""
+    results, _ = tried(device, [clause], clause.needs, clause.name)
+    if [one.verdict for one in results] != [Verdict.FAILED]:
+        results, _ = tried(device, KITS[device].clauses, clause.needs, clause.name)
+    fails_in(clause, results)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", KITS)
+def test_a_device_that_breaks_a_clause_fails_in_no_other(name: str) -> None:
+    for device, clause in IN_REACH:
+        if device == name:
+            results, _ = tried(device, KITS[device].clauses, clause.needs, clause.name)
+            fails_in(clause, results)
+
+
+def fails_in(clause: Clause[object], results: Sequence[Result]) -> None:
+    """In this clause alone, and it is shown."""
+    failed = [one for one in results if one.verdict is Verdict.FAILED]
+    assert [one.clause.name for one in failed] == [clause.name]
+    assert failed[0].why
+    assert failed[0].proof, "packets that show it"
 
 
 @pytest.mark.parametrize(

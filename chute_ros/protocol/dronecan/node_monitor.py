@@ -28,8 +28,8 @@ _MOST_CLOCKS = 4
 #: ids, as a node with two is asked each second.
 _MEMORY, _UNIQUE_ID_MEMORY = 60.0, 12.0
 #: So many NodeStatus within this time (s) that do not count on: two nodes count, each for itself.
-_MOST_BACKWARDS = 3
-_BACKWARDS_WITHIN = 10.0
+_MOST_MISCOUNTS = 3
+_MISCOUNTS_WITHIN = 10.0
 #: Between two questions to a node that is known (s): another one may have come in its place.
 _ASK_AGAIN = 10.0
 #: What looks like a restart or another device may be two nodes under one id: told after this, s.
@@ -62,7 +62,7 @@ class NodeEntry:
     unique_ids: dict[bytes, float] = field(default_factory=dict)
     #: Of the newest NodeStatus, and when one did not count on.
     transfer_id: int = -1
-    backwards: list[float] = field(default_factory=list)
+    miscounts: list[float] = field(default_factory=list)
 
     @property
     def unique_id(self) -> bytes:
@@ -117,8 +117,8 @@ class NodeMonitor:
         if entry is None or not entry.alive(now):
             entry = self._nodes[node_id] = NodeEntry(node_id, now)
         entry.heard = now
-        backwards = (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
-        if backwards and -1 not in (entry.transfer_id, transfer_id):
+        miscounts = (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
+        if miscounts and -1 not in (entry.transfer_id, transfer_id):
             self._does_not_count_on(entry, values["uptime_sec"], now)
         entry.uptime, entry.transfer_id = values["uptime_sec"], transfer_id
         self._watch_start(entry, now)
@@ -237,8 +237,8 @@ class NodeMonitor:
     def _does_not_count_on(entry: NodeEntry, uptime: int, now: float) -> None:
         if uptime < entry.uptime:
             return  # it started anew, or its clock says already that there are two
-        entry.backwards = [*(at for at in entry.backwards if now - at < _BACKWARDS_WITHIN), now]
-        if len(entry.backwards) >= _MOST_BACKWARDS:
+        entry.miscounts = [*(at for at in entry.miscounts if now - at < _MISCOUNTS_WITHIN), now]
+        if len(entry.miscounts) >= _MOST_MISCOUNTS:
             entry.conflict_shows(now)
 
     def _watch_start(self, entry: NodeEntry, now: float) -> None:

@@ -9,7 +9,7 @@ from itertools import cycle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit_run import KitRun, fails_in, fails_in_no_other
+from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Risk, Verdict
@@ -87,17 +87,6 @@ def test_what_needs_a_key_or_the_ground_passes_with_it() -> None:
 
 def test_each_clause_has_a_way_to_be_broken() -> None:
     assert {*BREAKS} == {*IN_REACH}
-
-
-@pytest.mark.parametrize("name", IN_REACH)
-def test_a_device_that_breaks_a_clause_fails_in_it(name: str) -> None:
-    fails_in(KIT, name)
-
-
-@pytest.mark.long
-def test_a_device_that_breaks_a_clause_fails_in_no_other() -> None:
-    for name in IN_REACH:
-        fails_in_no_other(KIT, name)
 
 
 def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:

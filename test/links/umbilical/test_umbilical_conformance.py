@@ -9,7 +9,7 @@ from itertools import cycle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit_run import KitRun, fails_in, fails_in_no_other
+from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import SOAK, Risk, Verdict
@@ -118,17 +118,6 @@ def test_a_firmware_that_wants_its_flash_wiped_is_not_armed() -> None:
 
 def test_each_clause_has_a_way_to_be_broken() -> None:
     assert sorted(BREAKS) == sorted(NAMES)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_device_that_breaks_a_clause_fails_in_it(name: str) -> None:
-    fails_in(KIT, name)
-
-
-@pytest.mark.long
-def test_a_device_that_breaks_a_clause_fails_in_no_other() -> None:
-    for name in NAMES:
-        fails_in_no_other(KIT, name)
 
 
 # -- what shows only at a second look -------------------------------------------------------------

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit_run import KitRun, fails_in, fails_in_no_other, of, problem, results
+from kit_run import KitRun, of, problem, results
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import SOAK, Risk, Verdict
@@ -87,17 +87,6 @@ def test_a_sound_device_passes_all_that_is_allowed(given: tuple[str, ...]) -> No
 
 def test_each_clause_has_a_way_to_be_broken() -> None:
     assert sorted(BREAKS) == sorted(IN_REACH)
-
-
-@pytest.mark.parametrize("name", IN_REACH)
-def test_a_device_that_breaks_a_clause_fails_in_it(name: str) -> None:
-    fails_in(KIT, name)
-
-
-@pytest.mark.long
-def test_a_device_that_breaks_a_clause_fails_in_no_other() -> None:
-    for name in IN_REACH:
-        fails_in_no_other(KIT, name)
 
 
 def test_what_no_bench_can_show_is_not_tried_and_has_a_reason() -> None:

@@ -27,32 +27,30 @@ class HeartbeatHold:
     def __init__(self, setting: HeartbeatInFlight) -> None:
         self._setting = setting
         self._records_in_flight = 0
-        #: When telemetry shows what became of a <L>, and when it is no longer waited for.
-        self._launch_shows, self._launch_over = math.inf, -math.inf
+        #: When a <L> left of which it is not known what became; infinity: there is none.
+        self._launch_sent = math.inf
 
     def record(self, flying: bool, now: float) -> None:
         """A record came, by which it flies or not."""
         self._records_in_flight = self._records_in_flight + 1 if flying else 0
-        if not flying and now >= self._launch_shows:
-            self._launch_over = -math.inf
+        if not flying and now >= self._launch_sent + _LAUNCH_SHOWS:
+            self._launch_sent = math.inf
 
     def token_sent(self, name: str, now: float) -> None:
         """This command leaves."""
         if name == "launch":
-            self._launch_shows = now + _LAUNCH_SHOWS
-            self._launch_over = now + _LAUNCH_MAY_BE_UNSEEN
+            self._launch_sent = now
 
     def holds(self, layout: Layout | None, now: float) -> bool:
         """None may be sent now. layout: of the telemetry; None: not recognised yet."""
-        if now >= self._launch_over:
-            self._launch_over = -math.inf
+        if now >= self.next_deadline():
+            self._launch_sent = math.inf
         by_layout = layout is not None and layout.heartbeat_in_flight
         auto = self._setting is HeartbeatInFlight.AUTO
         if self._setting is HeartbeatInFlight.YES or (auto and by_layout):
             return False
-        launches = self._launch_over > -math.inf
-        return launches or self._records_in_flight >= _FLIES
+        return self._launch_sent < math.inf or self._records_in_flight >= _FLIES
 
     def next_deadline(self) -> float:
         """When time alone lets them go on; infinity: it does not."""
-        return self._launch_over if self._launch_over > -math.inf else math.inf
+        return self._launch_sent + _LAUNCH_MAY_BE_UNSEEN
