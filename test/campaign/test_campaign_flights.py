@@ -7,6 +7,7 @@ from functools import partial
 
 import pytest
 from campaign_bench import FOLDER, SHIPPED, fired, flown, rocket, scenario
+from combinations import combinations
 
 from chute_ros.campaign import campaign
 from chute_ros.campaign.channel import Spell
@@ -39,9 +40,10 @@ UNBRAKED = (Failure.NO_DROGUE, Failure.FAULT, Failure.COMPUTER_REBOOT)
 BUNDLE = partial(campaign.fly_bundle, FOLDER)
 
 
-@pytest.mark.parametrize("vehicle", AIRCRAFT)
-@pytest.mark.parametrize("profile", PROFILES[:2])
-@pytest.mark.parametrize("failure", [Failure.MOTOR, Failure.REBOOT])
+@pytest.mark.parametrize(
+    ("vehicle", "profile", "failure"),
+    combinations(AIRCRAFT, PROFILES[:2], [Failure.MOTOR, Failure.REBOOT]),
+)
 def test_what_falls_is_killed_and_released_in_time(
     failure: Failure, profile: str, vehicle: str
 ) -> None:
@@ -51,8 +53,9 @@ def test_what_falls_is_killed_and_released_in_time(
     assert [one.decision.action for one in fired(end)] == [Action.KILL, Action.DEPLOY]
 
 
-@pytest.mark.parametrize("vehicle", AIRCRAFT)
-@pytest.mark.parametrize("failure", [Failure.NOTHING, Failure.HANG])
+@pytest.mark.parametrize(
+    ("vehicle", "failure"), combinations(AIRCRAFT, [Failure.NOTHING, Failure.HANG])
+)
 def test_what_flies_on_is_left_alone(failure: Failure, vehicle: str) -> None:
     end = flown(failure, gusts=1.0, vehicle=vehicle)
     assert judge(end).count is Count.CORRECT
@@ -145,8 +148,10 @@ def test_a_controller_that_dies_does_not_keep_the_trigger_from_firing() -> None:
     assert end.released < end.truth.latest
 
 
-@pytest.mark.parametrize("by", [-3600.0, -1.0, 1.0, 3600.0])
-@pytest.mark.parametrize("who", ["supervisor", "mavlink_parachute"])
+@pytest.mark.parametrize(
+    ("by", "who"),
+    combinations([-3600.0, -1.0, 1.0, 3600.0], ["supervisor", "mavlink_parachute"]),
+)
 def test_a_wall_clock_that_is_set_makes_no_decision_too_old(who: str, by: float) -> None:
     end = flown(Failure.MOTOR, ClockJump(who, 0.9, by))
     assert judge(end).count is Count.CORRECT

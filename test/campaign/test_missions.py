@@ -7,6 +7,7 @@ import math
 
 import pytest
 from campaign_bench import fired, flown
+from combinations import combinations
 
 from chute_ros.campaign.judge import Count, judge
 from chute_ros.campaign.manoeuvre import Manoeuvre, landing
@@ -14,8 +15,7 @@ from chute_ros.campaign.scenario import Failure, Stop
 from chute_ros.sim.autopilot_kinds import KINDS
 
 
-@pytest.mark.parametrize("touches", [0.5, 2.0, 4.0])
-@pytest.mark.parametrize("slope", [0.0, 25.0])
+@pytest.mark.parametrize(("touches", "slope"), combinations([0.5, 2.0, 4.0], [0.0, 25.0]))
 def test_a_landing_soft_or_hard_level_or_on_a_slope_ends_no_flight(touches, slope) -> None:
     end = flown(Failure.NOTHING, height=20.0, manoeuvre=landing(20.0, 3.0, touches, 0.5, slope))
     assert judge(end).count is Count.CORRECT
@@ -29,8 +29,7 @@ def test_it_bounces_and_then_stands_and_is_disarmed() -> None:
     assert any("IN_FLIGHT -> LANDED" in text for text in said), said
 
 
-@pytest.mark.parametrize("kind", list(KINDS))
-@pytest.mark.parametrize("arms", [True, False])
+@pytest.mark.parametrize(("kind", "arms"), combinations(list(KINDS), [True, False]))
 def test_a_second_flight_without_a_reset_is_watched_as_the_first(kind, arms) -> None:
     end = flown(Failure.MOTOR, flights=2, arms=arms)
     assert judge(end).count is Count.CORRECT

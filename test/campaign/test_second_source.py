@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 from campaign_bench import SHIPPED, fired, flown, scenario
+from combinations import combinations
 
 from chute_ros.campaign import draw as drawing
 from chute_ros.campaign.blind import Need, blinded
@@ -23,9 +24,14 @@ WITH_BOTH = (VEHICLE_STATE, IMU, ODOMETRY)
 IMU_FIRST = (IMU, VEHICLE_STATE)
 
 
-@pytest.mark.parametrize("vehicle", ["mavlink", "upf", "both"])
-@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
-@pytest.mark.parametrize("sources", [WITH_ODOMETRY, WITH_BOTH, (ODOMETRY, VEHICLE_STATE)])
+@pytest.mark.parametrize(
+    ("sources", "profile", "vehicle"),
+    combinations(
+        [WITH_ODOMETRY, WITH_BOTH, (ODOMETRY, VEHICLE_STATE)],
+        ["multirotor", "fixed_wing"],
+        ["mavlink", "upf", "both"],
+    ),
+)
 def test_what_outlives_the_autopilot_shows_the_fall(
     sources: tuple[str, ...], profile: str, vehicle: str
 ) -> None:
@@ -47,8 +53,10 @@ def test_an_attitude_beside_an_autopilot_that_is_lost_is_enough(profile: str) ->
     assert judge(end).count is Count.CORRECT
 
 
-@pytest.mark.parametrize("sources", [WITH_IMU, WITH_ODOMETRY, IMU_FIRST, WITH_BOTH])
-@pytest.mark.parametrize("failure", [Failure.NOTHING, Failure.HANG])
+@pytest.mark.parametrize(
+    ("sources", "failure"),
+    combinations([WITH_IMU, WITH_ODOMETRY, IMU_FIRST, WITH_BOTH], [Failure.NOTHING, Failure.HANG]),
+)
 def test_what_flies_on_is_left_alone(failure: Failure, sources: tuple[str, ...]) -> None:
     end = flown(failure, gusts=1.0, vehicle_sources=sources)
     assert judge(end).count is Count.CORRECT

@@ -7,6 +7,7 @@ import math
 
 import pytest
 from campaign_bench import fired, flown
+from combinations import combinations
 
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.judge import Count, judge
@@ -46,8 +47,9 @@ def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: str) -> None:
     assert end.landing_speed <= 6.5 or math.isnan(end.landed)
 
 
-@pytest.mark.parametrize("kind", list(KINDS))
-@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+@pytest.mark.parametrize(
+    ("kind", "profile"), combinations(list(KINDS), ["multirotor", "fixed_wing"])
+)
 def test_what_a_person_alone_kills_is_not_released_by_any_autopilot(
     kind: str, profile: str
 ) -> None:
@@ -141,12 +143,16 @@ def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
     assert [text for at, text in end.alarmed if at > end.another.at]
 
 
-@pytest.mark.parametrize("vehicle", ["mavlink", "upf"])
-@pytest.mark.parametrize(("how", "strength"), [("leans", 0.33), ("diverges", 4.0)])
+@pytest.mark.parametrize(
+    ("runs_away", "vehicle"),
+    combinations(
+        [EstimatorFault("leans", 1.0, 9.0, 0.33), EstimatorFault("diverges", 1.0, 9.0, 4.0)],
+        ["mavlink", "upf"],
+    ),
+)
 def test_an_estimator_that_runs_away_on_the_ground_releases_nothing(
-    how: str, strength: float, vehicle: str
+    runs_away: EstimatorFault, vehicle: str
 ) -> None:
-    runs_away = EstimatorFault(how, 1.0, 9.0, strength)
     end = flown(Failure.NOTHING, runs_away, height=0.0, vehicle=vehicle)
     assert not end.truth.falls
     assert math.isnan(end.released)

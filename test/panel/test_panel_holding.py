@@ -130,12 +130,12 @@ def test_a_burst_that_a_busy_panel_obeys_slowly_is_one(fly, vehicles, page):
     assert "eset: NOT SENT: " in page.locator(".answers").inner_text()
 
 
-@pytest.mark.parametrize("beat", ["null", "NaN", "-1", "1e9", "'x'", "[1]", "undefined"])
-def test_an_order_without_a_beat_of_now_is_refused(fly, vehicles, page, beat):
-    page.evaluate(
-        f"""() => [...document.querySelectorAll("button.hold")].forEach((one) =>
-            one.dispatchEvent(new CustomEvent("held", {{detail: {beat}}})))"""
-    )
+def test_an_order_without_a_beat_of_now_is_refused(fly, vehicles, page):
+    for beat in ("null", "NaN", "-1", "1e9", "'x'", "[1]", "undefined"):
+        page.evaluate(
+            f"""() => [...document.querySelectorAll("button.hold")].forEach((one) =>
+                one.dispatchEvent(new CustomEvent("held", {{detail: {beat}}})))"""
+        )
     told = "NOT SENT: the page was not connected"
     until(fly, lambda: told in page.locator(".answers").first.inner_text(), page)
     assert orders(fly, vehicles, page) == 0

@@ -14,6 +14,8 @@ from urllib.parse import urlencode
 import pytest
 from panel_bench import PASSWORD, password_file
 
+from chute_ros.errors import ParameterError
+from chute_ros.tools.panel.password import password_from
 from chute_ros.tools.processes import ros_arguments
 
 # One browser at a time: it takes a core of its own.
@@ -52,15 +54,21 @@ def test_orders_need_a_password(ros):
         (None, 0, "No such file or directory"),
     ],
 )
-def test_a_password_file_that_is_none(ros, tmp_path, text, mode, told):
+def test_a_password_file_that_is_none(tmp_path, text, mode, told):
     file = tmp_path / "password"
     if text is not None:
         file.write_text(f"{text}\n")
         file.chmod(mode)
+    with pytest.raises(ParameterError, match=told) as refused:
+        password_from(str(file))
+    assert str(refused.value).startswith(f"parameter password_file: {file}")
+
+
+def test_without_its_password_file_it_does_not_start(ros, tmp_path):
+    file = tmp_path / "password"
     code, said = started_with(allow_commands="true", password_file=file)
     assert code == 2
-    assert said.startswith(f"panel: parameter password_file: {file}")
-    assert told in said
+    assert said.startswith(f"panel: parameter password_file: {file}: ")
 
 
 def test_without_nicegui_it_says_what_to_install(ros, tmp_path, monkeypatch):
@@ -145,12 +153,10 @@ def test_a_login_gives_a_cookie_that_no_script_and_no_other_page_can_use(panel):
     assert 'chute_panel=""' in headers["set-cookie"]
 
 
-@pytest.mark.parametrize(
-    "onward", ["//evil.example/", "/\\evil.example", "https://evil.example/", "javascript:x"]
-)
-def test_a_login_leads_to_no_other_page(panel, onward):
-    status, headers, _ = logged_in(panel, path=f"/login?{urlencode({'next': onward})}")
-    assert (status, headers["location"]) == (303, "/")
+def test_a_login_leads_to_no_other_page(panel):
+    for onward in ("//evil.example/", "/\\evil.example", "https://evil.example/", "javascript:x"):
+        status, headers, _ = logged_in(panel, path=f"/login?{urlencode({'next': onward})}")
+        assert (status, headers["location"]) == (303, "/"), onward
 
 
 def test_guessing_is_told_and_kept_waiting(panel):

@@ -77,6 +77,7 @@ def sees(page, text):
         expect(page.locator("body")).to_contain_text(text, timeout=PATIENCE)
 
 
+@pytest.mark.long
 def test_the_tutorial_is_true(address, open_page):
     where, password = address
     page = open_page(where)

@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from combinations import combinations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from story import DOWN, Story, falling, pressure_at, shipped
@@ -18,7 +19,8 @@ from chute_ros.supervisor.contradictions import GRAVITY, least_drop
 from chute_ros.supervisor.machine import Stage
 
 EVERY = 0.1
-AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+PROFILES = ("multirotor", "fixed_wing")
+AIRCRAFT = pytest.mark.parametrize("profile", PROFILES)
 
 
 class Teller:
@@ -136,14 +138,15 @@ def test_one_that_runs_away_at_touch_down_releases_nothing() -> None:
 # -- in the air ----------------
 
 
-@AIRCRAFT
 @pytest.mark.parametrize(
-    "told",
-    [{"reboot_count": 1, "rebooted_in_flight": True}, {"system_status": 6}],
-    ids=["started anew", "emergency"],
+    ("profile", "told", "force", "row"),
+    combinations(
+        PROFILES,
+        [{"reboot_count": 1, "rebooted_in_flight": True}, {"system_status": 6}],
+        [0.3, 2.0, 3.5],
+        [2, 3, 5],
+    ),
 )
-@pytest.mark.parametrize("force", [0.3, 2.0, 3.5])
-@pytest.mark.parametrize("row", [2, 3, 5])
 def test_an_accelerometer_that_fails_beside_what_an_autopilot_says_ends_no_hover(
     profile: str, told: dict[str, Any], force: float, row: int
 ) -> None:
@@ -157,9 +160,10 @@ def test_an_accelerometer_that_fails_beside_what_an_autopilot_says_ends_no_hover
     assert teller.story.fired() == []
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("drift", [1.5, 2.0, 3.0, 4.0, 6.0])
-@pytest.mark.parametrize("barometer", [True, False])
+@pytest.mark.parametrize(
+    ("profile", "drift", "barometer"),
+    combinations(PROFILES, [1.5, 2.0, 3.0, 4.0, 6.0], [True, False]),
+)
 def test_an_estimator_that_sinks_while_the_vehicle_hovers_ends_no_flight(
     profile: str, drift: float, barometer: bool
 ) -> None:
@@ -313,9 +317,9 @@ def test_what_falls_has_come_down_by_what_is_asked_of_it(
         assert lost[-1] - highest >= least_drop(sinks[-1], passed)
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("gap", [0.6, 1.5, 3.0])
-@pytest.mark.parametrize("heard_before", [0.3, 1.0])
+@pytest.mark.parametrize(
+    ("profile", "gap", "heard_before"), combinations(PROFILES, [0.6, 1.5, 3.0], [0.3, 1.0])
+)
 def test_one_that_falls_while_nothing_is_heard_of_it_is_released_no_later_with_a_barometer(
     profile: str, gap: float, heard_before: float
 ) -> None:
@@ -355,9 +359,9 @@ def test_one_that_climbs_and_falls_while_nothing_is_heard_of_it_is_released(prof
     assert story.t < back_at + 1.5
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("rate", [12.0, 25.0, 50.0])
-@pytest.mark.parametrize("sink", [1.5, 3.0, 4.5])
+@pytest.mark.parametrize(
+    ("profile", "rate", "sink"), combinations(PROFILES, [12.0, 25.0, 50.0], [1.5, 3.0, 4.5])
+)
 def test_an_estimator_that_leans_over_in_a_descent_by_hand_ends_no_flight(
     profile: str, rate: float, sink: float
 ) -> None:
@@ -453,10 +457,9 @@ def test_accelerometers_that_differ_forbid_the_take_off() -> None:
     assert "acceleration is in doubt: another source differs" in teller.story.said()
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("sink", [3.5, 4.5, 5.5])
 @pytest.mark.parametrize(
-    "wrong", [{"force": 0.0}, {"tilt": 169.0}, {"tilt": 95.0}], ids=["no force", "jump", "lies"]
+    ("profile", "sink", "wrong"),
+    combinations(PROFILES, [3.5, 4.5, 5.5], [{"force": 0.0}, {"tilt": 169.0}, {"tilt": 95.0}]),
 )
 def test_one_wrong_sensor_in_a_descent_that_is_flown_ends_no_flight(
     profile: str, sink: float, wrong: dict[str, float]
@@ -801,11 +804,10 @@ def coming_down(profile: str, sink: float, barometer: bool) -> tuple[Teller, flo
     return teller, height
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("sink", [3.5, 7.2])
-@pytest.mark.parametrize("turns_to", [85.0, 179.0])
-@pytest.mark.parametrize("rate", [30.0, 200.0, math.inf])
-@pytest.mark.parametrize("barometer", [True, False])
+@pytest.mark.parametrize(
+    ("profile", "sink", "turns_to", "rate", "barometer"),
+    combinations(PROFILES, [3.5, 7.2], [85.0, 179.0], [30.0, 200.0, math.inf], [True, False]),
+)
 def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
     profile: str, sink: float, turns_to: float, rate: float, barometer: bool
 ) -> None:
@@ -823,11 +825,10 @@ def test_an_attitude_that_turns_over_alone_in_a_descent_ends_no_flight(
         assert teller.story.fired() == [], f"{command=}"
 
 
-@AIRCRAFT
-@pytest.mark.parametrize("sink", [0.0, 7.0])
-@pytest.mark.parametrize("turned", [85.0, 179.0])
-@pytest.mark.parametrize("thrust", [9.8, 3.0])
-@pytest.mark.parametrize("barometer", [True, False])
+@pytest.mark.parametrize(
+    ("profile", "sink", "turned", "thrust", "barometer"),
+    combinations(PROFILES, [0.0, 7.0], [85.0, 179.0], [9.8, 3.0], [True, False]),
+)
 def test_one_that_snaps_over_and_sinks_faster_for_it_is_released(
     profile: str, sink: float, turned: float, thrust: float, barometer: bool
 ) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from combinations import combinations
 from test_one_estimator import EVERY, deployed
 from test_two_origins import HIGH, fall, falling_flat, up
 
@@ -13,7 +14,7 @@ from chute_ros.supervisor.contradictions import GRAVITY
 
 #: Error of the pressure as a part of the dynamic one: PX4's EKF2_PCOEF_* correct 0.5, ArduPilot's
 #: BARO1_WCF_* 1.0.
-ERRORS = pytest.mark.parametrize("error", [-0.5, -0.2, 0.0, 0.2, 0.5])
+ERRORS = (-0.5, -0.2, 0.0, 0.2, 0.5)
 
 
 def too_low(error: float, airspeed: float) -> float:
@@ -21,8 +22,7 @@ def too_low(error: float, airspeed: float) -> float:
     return error * airspeed**2 / (2.0 * GRAVITY)
 
 
-@ERRORS
-@pytest.mark.parametrize("airspeed", [16.0, 22.0, 25.0])
+@pytest.mark.parametrize(("error", "airspeed"), combinations(ERRORS, [16.0, 22.0, 25.0]))
 def test_a_multirotor_that_leans_far_and_flies_level_is_not_ended(
     error: float, airspeed: float
 ) -> None:
@@ -70,7 +70,7 @@ def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(
     assert falling_flat(took, fastest)[0] < 2.2 * fastest
 
 
-@ERRORS
+@pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("fastest", [12.0, 18.0, 25.0])
 def test_what_lies_on_its_side_with_the_thrust_of_a_hover_is_deployed(
     error: float, fastest: float

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import pytest
+from combinations import combinations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from story import DOWN
@@ -104,15 +105,19 @@ def turning(
     return math.nan
 
 
-@pytest.mark.parametrize(("force", "tilt"), [(13.0, 3.0), (24.0, 3.0), (13.0, 65.0)])
-@pytest.mark.parametrize("sink", [9.0, 16.0])
 @pytest.mark.parametrize(
-    ("runs_away", "target"), [(0.0, True), (0.0, False), (1.0, False), (-6.0, False)]
+    ("feels", "sink", "estimates"),
+    combinations(
+        [(13.0, 3.0), (24.0, 3.0), (13.0, 65.0)],
+        [9.0, 16.0],
+        [(0.0, True), (0.0, False), (1.0, False), (-6.0, False)],
+    ),
 )
 def test_a_spin_that_its_estimator_does_not_tell_is_told_by_force_and_barometer(
-    force: float, tilt: float, sink: float, runs_away: float, target: bool
+    feels: tuple[float, float], sink: float, estimates: tuple[float, bool]
 ) -> None:
     """Upright it would be carried by its weight, and at 65 degrees by more than twice that."""
+    (force, tilt), (runs_away, target) = feels, estimates
     told = {"target_vertical_speed": 0.0, "attitude_error": 1.0} if target else {}
     took = turning(up("fixed_wing"), sink, force, runs_away, **told, tilt=tilt)
     # One that runs away downwards is right for a moment.

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from combinations import combinations
 from story import LINK, START, TILTS, Story, falling, rule, shipped, with_rules
 
 from chute_ros.model import Action, Armed, LinkState
@@ -151,7 +152,8 @@ def heartbeats(story: Story, until: float) -> Story:
     return story
 
 
-PROFILES = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing", "rocket", "by_hand"])
+NAMES = ("multirotor", "fixed_wing", "rocket", "by_hand")
+PROFILES = pytest.mark.parametrize("profile", NAMES)
 
 
 @PROFILES
@@ -162,9 +164,9 @@ def test_a_fall_is_judged_the_same(profile: str) -> None:
     story.fly(6.0)
 
 
-@PROFILES
 @pytest.mark.parametrize(
-    "gone", ["tilt", "acceleration", "vertical_speed", "height", "battery_remaining"]
+    ("profile", "gone"),
+    combinations(NAMES, ["tilt", "acceleration", "vertical_speed", "height", "battery_remaining"]),
 )
 def test_a_fall_with_a_measurement_that_ends_in_it_is_judged_the_same(
     profile: str, gone: str

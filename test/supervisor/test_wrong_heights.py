@@ -7,6 +7,7 @@ import random
 from dataclasses import replace
 
 import pytest
+from combinations import combinations
 from story import START, Story, falling, shipped
 
 from chute_ros.supervisor import inputs as i
@@ -16,8 +17,7 @@ from chute_ros.supervisor.machine import Stage
 SEEDS = pytest.mark.parametrize("seed", range(8))
 
 
-@SEEDS
-@pytest.mark.parametrize("size", [5.0, 10.0, 30.0])
+@pytest.mark.parametrize(("seed", "size"), combinations(range(8), [5.0, 10.0, 30.0]))
 def test_noise_on_the_height_is_no_sink_though_nothing_else_tells_a_speed(
     seed: int, size: float
 ) -> None:
@@ -114,9 +114,12 @@ def test_a_height_that_is_told_no_more_is_unknown_from_then_on_though_nobody_is_
     assert story.decisions()[-1].rule == "critical sink"
 
 
-@pytest.mark.parametrize("size", [0.7, 1.5, 2.5])
-@pytest.mark.parametrize("wrong", [{"tilt": 80.0}, {"acceleration": 0.1}])
-@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+@pytest.mark.parametrize(
+    ("size", "wrong", "profile"),
+    combinations(
+        [0.7, 1.5, 2.5], [{"tilt": 80.0}, {"acceleration": 0.1}], ["multirotor", "fixed_wing"]
+    ),
+)
 def test_one_wrong_sensor_beside_the_noise_of_a_barometer_ends_no_flight(
     profile: str, wrong: dict[str, float], size: float
 ) -> None:

@@ -177,8 +177,7 @@ def test_after_the_scheduler_died_the_flights_go_on_at_another(
 
 def copied(folder, change):
     """An environment in which the package is another; change: with which file."""
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(PACKAGE, folder / "chute_ros", ignore=ignored)
+    shutil.copytree(PACKAGE, folder / "chute_ros")
     shutil.copytree(config_folder(), folder / "config")
     if (PACKAGE.parent / "msg_defs").is_dir():
         (folder / "msg_defs").symlink_to(PACKAGE.parent / "msg_defs")

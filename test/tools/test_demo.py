@@ -24,37 +24,39 @@ def start(*arguments):
 
 # What is flown once for all of them is flown by one worker.
 pytestmark = pytest.mark.xdist_group("demo")
-#: Name -> arguments.
-RUNS = {
-    "good": (),
-    "bad": ("--fault", "parachute-mute"),
-    "upf": ("--parachute", "upf"),
-    "both": ("--parachute", "both"),
-    "rocket": ("--vehicle", "rocket"),
-    "deaf": ("--vehicle", "rocket", "--fault", "parachute-mute"),
-}
-#: Runs at one time: more, on a machine with two cores, starve each other of the heartbeats that
-#: they are about.
-SIDE_BY_SIDE = 2
+#: Name -> arguments of those that are flown at one time: more, on a machine with two cores, starve
+#: each other of the heartbeats that they are about.
+RUNS = (
+    {"good": (), "bad": ("--fault", "parachute-mute")},
+    {"both": ("--parachute", "both"), "rocket": ("--vehicle", "rocket")},
+    {
+        "upf": ("--parachute", "upf"),
+        "deaf": ("--vehicle", "rocket", "--fault", "parachute-mute"),
+    },
+)
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Name -> (exit code, stdout, stderr, folder of the logs)."""
-    ends, names = {}, list(RUNS)
-    for first in range(0, len(names), SIDE_BY_SIDE):
-        together = {}
-        for name in names[first : first + SIDE_BY_SIDE]:
-            folder = tmp_path_factory.mktemp(name)
-            together[name] = (start("--logs", str(folder), *RUNS[name]), folder)
-        for name, (child, folder) in together.items():
-            out, err = child.communicate(timeout=120.0)
-            ends[name] = (child.returncode, out, err, folder)
-    return ends
+    """runs(name): (exit code, stdout, stderr, folder of the logs), flown as it is asked for."""
+    ends = {}
+
+    def run(name):
+        if name not in ends:
+            together = {}
+            for one, arguments in next(pair for pair in RUNS if name in pair).items():
+                folder = tmp_path_factory.mktemp(one)
+                together[one] = (start("--logs", str(folder), *arguments), folder)
+            for one, (child, folder) in together.items():
+                out, err = child.communicate(timeout=120.0)
+                ends[one] = (child.returncode, out, err, folder)
+        return ends[name]
+
+    return run
 
 
 def test_it_passes_from_the_block_to_the_touchdown(runs):
-    code, out, err, _ = runs["good"]
+    code, out, err, _ = runs("good")
     assert code == 0, out + err
     story = [
         "no parachute yet",
@@ -76,7 +78,7 @@ def test_it_passes_from_the_block_to_the_touchdown(runs):
 
 
 def test_its_summary_has_the_kill_before_the_release(runs):
-    _, out, _, _ = runs["good"]
+    _, out, _, _ = runs("good")
     times = {
         name: float(seconds)
         for seconds, name in re.findall(r"^ +(\d+\.\d{3}) s  (.+)$", out, re.MULTILINE)
@@ -89,15 +91,16 @@ def test_its_summary_has_the_kill_before_the_release(runs):
 
 
 def test_it_keeps_the_logs_where_it_is_told_to(runs):
-    logs = {file.name: file.read_text() for file in runs["good"][3].glob("*.log")}
+    logs = {file.name: file.read_text() for file in runs("good")[3].glob("*.log")}
     assert set(logs) == {f"{n}.log" for n in ("supervisor", "mavlink", "autopilot", "parachute")}
     assert "RELEASED by" in logs["parachute.log"]
     assert "DISARMED" in logs["autopilot.log"]
     assert not any("Traceback" in text for text in logs.values())
 
 
+@pytest.mark.long
 def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
-    code, out, err, folder = runs["upf"]
+    code, out, err, folder = runs("upf")
     assert code == 0, out + err
     story = [
         "upf_can 33 received",
@@ -117,7 +120,7 @@ def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
 
 
 def test_with_both_parachutes_the_first_of_the_ladder_is_enough(runs):
-    code, out, err, folder = runs["both"]
+    code, out, err, folder = runs("both")
     assert code == 0, out + err
     assert "mavlink_parachute DEPLOY CONFIRMED" in out
     assert "RELEASED by" in (folder / "parachute.log").read_text()
@@ -125,7 +128,7 @@ def test_with_both_parachutes_the_first_of_the_ladder_is_enough(runs):
 
 
 def test_a_rocket_flies_to_its_landing_under_the_canopies_that_were_called_for(runs):
-    code, out, err, folder = runs["rocket"]
+    code, out, err, folder = runs("rocket")
     assert code == 0, out + err
     story = [
         "no cable yet",
@@ -155,17 +158,20 @@ def test_a_rocket_flies_to_its_landing_under_the_canopies_that_were_called_for(r
     assert not any("Traceback" in text for text in logs.values())
 
 
+@pytest.mark.long
 def test_a_rocket_that_takes_no_command_does_not_fly(runs):
-    code, out, err, _ = runs["deaf"]
+    code, out, err, _ = runs("deaf")
     assert code == 1, out + err
     assert "DEMO FAILED: wiping: " in err
     assert "LAUNCH\n" not in out
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("name", ["good", "upf", "both", "rocket"])
+@pytest.mark.parametrize(
+    "name", ["good", "both", "rocket", pytest.param("upf", marks=pytest.mark.long)]
+)
 def test_its_recording_decides_the_same_once_more(runs, name):
-    recordings = [str(file) for file in (runs[name][3] / "ros_home").rglob("*.mcap")]
+    recordings = [str(file) for file in (runs(name)[3] / "ros_home").rglob("*.mcap")]
     assert recordings
     done = subprocess.run(
         [sys.executable, "-m", "chute_ros.tools.replay", *recordings],
@@ -177,7 +183,7 @@ def test_its_recording_decides_the_same_once_more(runs, name):
 
 
 def test_where_a_step_cannot_happen_it_fails_loudly(runs):
-    code, out, err, _ = runs["bad"]
+    code, out, err, _ = runs("bad")
     assert code == 1, out + err
     assert "DEMO FAILED: arming: " in err
     assert "DEMO PASSED" not in out

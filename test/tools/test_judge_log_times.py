@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from combinations import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 from log_bench import FAILS, FAILS_AT, FORMATS, Told, flown, mavros
@@ -126,8 +127,7 @@ FOLDERS = ("mavros", "mavros.mcap")
 TOUCHED = ("flight.tlog", "flight.bin", "flight.log", "flight.ulg", "box.mcap")
 
 
-@pytest.mark.parametrize("name", TOUCHED)
-@pytest.mark.parametrize("by", [-6.0, 30.0, HOUR, 2 * YEAR])
+@pytest.mark.parametrize(("name", "by"), combinations(TOUCHED, [-6.0, 30.0, HOUR, 2 * YEAR]))
 def test_one_damaged_stamp_hides_no_fall(name, by, fallen, ends, tmp_path):
     """Given a message of 6 s before the motor fails, whose stamp is wrong."""
     wrong = next(k for k, one in enumerate(fallen) if one.at > FAILS_AT - 6.0)
