@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from functools import partial
+from pathlib import Path
 from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
@@ -17,6 +18,7 @@ from chute_ros.not_installed import remedy
 from chute_ros.plain_text import plain
 from chute_ros.ros.memory_limit import limit_memory
 from chute_ros.ros.middleware import set_up_middleware
+from chute_ros.transport.regular_file import NotRegularError, open_regular
 
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
 #: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
@@ -102,7 +104,7 @@ def _check_arguments(name: str) -> None:
     """What is not for ROS is for nobody: a node has parameters alone."""
     from rclpy.utilities import remove_ros_args
 
-    from chute_ros.ros.parameter_file import not_for_ros
+    from chute_ros.ros.parameter_file import files_of, not_for_ros
 
     others = not_for_ros(sys.argv[1:])
     usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
@@ -113,11 +115,23 @@ def _check_arguments(name: str) -> None:
         text = f"unknown argument {others[0]}: the settings of a node follow --ros-args"
         print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
         sys.exit(2)
+    for path in files_of(sys.argv[1:]):
+        # ROS would wait for ever for what comes out of a FIFO; what it cannot open it says itself.
+        with contextlib.suppress(OSError):
+            _require_regular(name, path)
     try:
         # As it starts it would say the same in two lines.
         remove_ros_args(sys.argv)
     except RuntimeError as error:
         _refused(name, error)
+
+
+def _require_regular(name: str, path: Path) -> None:
+    try:
+        open_regular(path).close()
+    except NotRegularError as error:
+        print(f"{name}: --params-file {path}: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 def _init(name: str) -> None:

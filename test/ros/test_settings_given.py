@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import itertools
+import os
 import subprocess
 import sys
 import tempfile
@@ -46,6 +47,7 @@ def start(node: str, *arguments: str) -> tuple[int, list[str]]:
 REFUSED = [
     (("--params-file", "FOLDER/none.yaml"), "Couldn't parse params file: '--params-file"),
     (("--params-file", "FOLDER/broken.yaml"), "Couldn't parse params file: '--params-file"),
+    (("--params-file", "FOLDER/fifo"), "fifo: no regular file but a FIFO"),
     (("--params-file",), "Couldn't parse trailing --params-file flag"),
     (("-r",), "Couldn't parse trailing -r flag"),
     (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
@@ -66,6 +68,7 @@ REFUSED = [
 def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
     node: str, tmp_path: Path
 ) -> None:
+    os.mkfifo(tmp_path / "fifo")
     (tmp_path / "broken.yaml").write_text("upf_can: [")
     (tmp_path / "unknown.yaml").write_text(f"/**/{node}:\n  ros__parameters:\n    url: x\n")
     (tmp_path / "other.yaml").write_text("somebody:\n  ros__parameters:\n    call_tries: 4\n")
