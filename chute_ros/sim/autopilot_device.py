@@ -56,6 +56,8 @@ class AutopilotDevice(AutopilotTelemetry):
         self._later: list[tuple[float, Callable[[], None]]] = []
         #: A take-off was ordered: from when on it says IN_AIR.
         self._in_air_from = math.inf
+        #: Disarmed in the air, it takes itself to stand from here on.
+        self._stands_from = math.inf
         self.terminated = False
         self._stepped_to = math.nan
         if kind.targets_of_a_wing:
@@ -104,6 +106,7 @@ class AutopilotDevice(AutopilotTelemetry):
         self.terminated = False
         self.model.armed = False
         self._in_air_from = math.inf
+        self._stands_from = self.now + self.kind.stands_disarmed
         self._later.clear()
         self._stepped_to = self.now
 
@@ -155,6 +158,7 @@ class AutopilotDevice(AutopilotTelemetry):
             self.model.armed = armed
             self.say("ARMED" if armed else "DISARMED")
             self._in_air_from = math.inf
+            self._stands_from = math.inf if armed else self.now + self.kind.stands_disarmed
             if self.kind.quick_heartbeat:
                 # Shown at once, but after the acknowledgement of whatever command did it.
                 self._due[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self.now
@@ -232,6 +236,8 @@ class AutopilotDevice(AutopilotTelemetry):
 
     @property
     def _takes_itself_to_fly(self) -> bool:
+        if self.now >= self._stands_from:
+            return False
         return not self.model.on_ground or self.now >= self._in_air_from
 
     def _after(self, delay: float, function: Callable[[], None]) -> None:

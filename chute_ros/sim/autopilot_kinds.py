@@ -44,6 +44,8 @@ class AutopilotKind:
     settles: float = 0.0
     #: From a take-off that was ordered to IN_AIR, whatever the height.
     early_in_air: float = math.inf
+    #: From being disarmed in the air, or started anew there, to ON_GROUND, whatever it does.
+    stands_disarmed: float = math.inf
     #: HEARTBEAT.custom_mode.
     custom_mode: int = 0
     #: EXTENDED_SYS_STATE.vtol_state: ArduCopter always says MC, a quadplane FW on its wing.
@@ -69,6 +71,7 @@ PX4 = AutopilotKind(
     bytewise=True,
     quick_heartbeat=False,
     settles=0.01,
+    stands_disarmed=0.35,
 )
 _ARDUPILOT = {"CHUTE_ENABLED": 0}
 ARDUCOPTER = AutopilotKind(
@@ -77,6 +80,7 @@ ARDUCOPTER = AutopilotKind(
     termination=Termination.DISARMS,
     disarm_refused=dialect.MAV_RESULT_FAILED,
     parameters=_ARDUPILOT,
+    stands_disarmed=0.0,
     vtol_state=dialect.MAV_VTOL_STATE_MC,
 )
 ARDUPLANE = AutopilotKind(

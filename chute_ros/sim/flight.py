@@ -117,7 +117,9 @@ class FlightModel:
             carried = self._thrust(dt) + self._drag() + self.push
             gained, self.acceleration = carried - GRAVITY, abs(carried)
         else:
-            gained = (-way.sink - self.vertical_speed) / max(way.settles, dt) + self.push
+            # What settles slowly follows the air slowly: a gust is no wind that carries it along.
+            gained = (-way.sink - self.vertical_speed) / max(way.settles, dt)
+            gained += self.push / max(way.settles, 1.0)
             self.acceleration = max(0.0, way.force + gained)
         self.vertical_speed += gained * dt
         self.height += self.vertical_speed * dt

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from chute_ros.model import Armed, LandedState
+from chute_ros.model import Airframe, Armed, LandedState, airframes_of
 from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
@@ -61,6 +61,9 @@ STEADY_FOR = 10.0
 RESTS_FOR = 60.0
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
+#: What was said of the landed state longer ago is no word against a newer one, s: at 5 Hz another
+#: has come.
+_SAID_NOW = 0.5
 
 
 def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -217,6 +220,24 @@ def armed(config: SupervisorConfig, state: State, now: float) -> Armed:
     if fresh(config, state, state.heard.vehicle.armed_age, now):
         return state.heard.vehicle.armed
     return Armed.UNKNOWN
+
+
+def says_off(state: State, now: float) -> bool:
+    """The autopilot says that its motors are off, and not that it flies. Of a multirotor PX4 and
+    ArduCopter say that it stands as soon as they are disarmed in the air (after 0.35 s at most, in
+    their own simulators): beside IN_AIR one of their two words is wrong. Those of a wing go on to
+    say IN_AIR for a while (ArduPlane)."""
+    return state.heard.vehicle.armed is Armed.DISARMED and not now <= flies_until(state)
+
+
+def flies_until(state: State) -> float:
+    """Until when a word of IN_AIR of a multirotor stands against one of DISARMED, monotonic s;
+    NaN: none does."""
+    vehicle = state.heard.vehicle
+    hovers = airframes_of(vehicle.vehicle_type) == (Airframe.MULTIROTOR,)
+    if not hovers or vehicle.landed_state is not LandedState.IN_AIR:
+        return math.nan
+    return state.heard.vehicle_received - vehicle.landed_state_age + _SAID_NOW
 
 
 def says_down(config: SupervisorConfig, state: State, now: float) -> bool | None:

@@ -83,7 +83,8 @@ def rests_until(config: SupervisorConfig, state: State, now: float) -> float:
     turns = [state.measured(name).turns_at(limits[name], after) for name in limits]
     # What it says of itself is young enough until then.
     said = state.heard.vehicle_received + config.vehicle_state_age
-    turns += [turn for turn in (said, said - state.heard.vehicle.armed_age) if turn >= after]
+    words = (said, said - state.heard.vehicle.armed_age, flight.flies_until(state))
+    turns += [turn for turn in words if turn >= after]
     return min(turns) - _ROUNDING
 
 

@@ -186,7 +186,7 @@ def _note_contradictions(turn: Turn) -> None:
     climb_beyond = math.nan if math.isnan(beyond) else target - rate
     since = {name: state.heard.denied_since.get(name, now) for name in denied}
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
-    off = state.heard.vehicle.armed is Armed.DISARMED
+    off = flight.says_off(state, now)
     told = {} if off else commanded(tilt, error, target, beyond, climb_beyond)
     last_command = NO_SAMPLE if off else _last_command(turn)
     if math.isnan(beyond):

@@ -2,6 +2,7 @@
 
 import math
 import random
+from statistics import fmean
 
 import pytest
 from hypothesis import given, settings
@@ -220,3 +221,15 @@ def test_in_gusts_it_feels_what_moves_it(failed):
         assert model.acceleration == pytest.approx(abs(GRAVITY + speeds_up))
         moved = max(moved, abs(speeds_up))
     assert moved > 1.0, "the gusts are felt"
+
+
+@pytest.mark.parametrize("settles", [0.5, 1.5, 3.0])
+def test_gusts_carry_along_what_comes_down_no_faster_than_they_are_strong(settles):
+    """However slowly it settles: 2 m/s^2 are gusts of some 2 m/s."""
+    way = Descent("glide", 4.0, settles=settles)
+    model = GustyModel(gusts=2.0, chance=random.Random(7), armed=True, descent=way)
+    model.height, model.motors_failed, off = 1000.0, True, []
+    for _ in range(6000):
+        model.step(STEP)
+        off.append(model.vertical_speed + 4.0)
+    assert math.sqrt(fmean(one**2 for one in off[300:])) < 2.0

@@ -53,6 +53,30 @@ def test_a_forced_disarm_is_obeyed_by_all(kind):
 
 
 @pytest.mark.parametrize(
+    ("kind", "after"), [(GENERIC, None), (PX4, 0.35), (ARDUCOPTER, 0.0), (ARDUPLANE, None)]
+)
+def test_disarmed_in_the_air_some_say_that_they_stand(kind, after):
+    station = flying(kind)
+
+    def stands():
+        return (
+            station.newest("EXTENDED_SYS_STATE").landed_state == dialect.MAV_LANDED_STATE_ON_GROUND
+        )
+
+    station.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 245, 20_000.0)
+    station.command(ARM_DISARM, 0, FORCE)
+    station.run(0.1, step=0.02)
+    assert stands() is (after == 0.0)
+    station.run(0.35, step=0.02)
+    assert stands() is (after is not None)
+    assert not station.device.model.on_ground
+    # Armed again, it flies.
+    station.command(ARM_DISARM, 1)
+    station.run(0.1, step=0.02)
+    assert not stands()
+
+
+@pytest.mark.parametrize(
     ("kind", "parameters", "answer", "released", "for_good"),
     [
         (GENERIC, {}, ACCEPTED, [], True),

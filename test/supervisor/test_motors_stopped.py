@@ -171,6 +171,61 @@ def test_one_that_descends_fast_and_whose_heartbeat_is_wrong_is_not() -> None:
     assert story.fired() == []
 
 
+QUADROTOR, QUADPLANE, UNTOLD = 2, 22, 0
+
+
+def dropped(mav_type: int, stands_after: float, disarms: bool = True) -> Story:
+    """Given that it drops as it was commanded, and says after 0.2 s that it is disarmed; from then
+    on it says IN_AIR for so long, s, and that it stands."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=80.0, vehicle_type=mav_type)
+    for k in range(1, 14):
+        sink, said = 0.98 * k, {}
+        if disarms and k > 2:
+            said = {"armed": Armed.DISARMED}
+            if 0.1 * (k - 2) > stands_after:
+                said["landed_state"] = LandedState.ON_GROUND
+        parts = {"height": 80.0 - 0.05 * sink * k, "vertical_speed": -sink, "acceleration": 0.4}
+        told = {"target_vertical_speed": -sink, "attitude_error": 0.5, "vehicle_type": mav_type}
+        story.at(2.0 + 0.1 * k, story.heartbeat(), story.told(**parts, **told, **said))
+    return story
+
+
+def test_a_word_of_disarmed_beside_one_of_in_the_air_ends_no_flight() -> None:
+    """PX4 and ArduCopter say that they stand once they are disarmed in the air."""
+    assert dropped(QUADROTOR, math.inf).fired() == dropped(QUADROTOR, 0.0, disarms=False).fired()
+    assert dropped(QUADROTOR, math.inf).fired() == []
+
+
+@pytest.mark.parametrize("stands_after", [0.0, 0.35])
+def test_one_that_says_then_that_it_stands_is_released(stands_after: float) -> None:
+    story = dropped(QUADROTOR, stands_after)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(D).rule == "disarmed in flight"
+    assert story.when(Action.KILL) - 2.2 < stands_after + 0.5
+
+
+@pytest.mark.parametrize("mav_type", [QUADPLANE, UNTOLD])
+def test_the_autopilot_of_a_wing_may_go_on_to_say_in_the_air(mav_type: int) -> None:
+    """ArduPlane does."""
+    assert dropped(mav_type, math.inf).fired() == ["KILL", "DEPLOY"]
+
+
+def test_what_it_said_before_is_no_word_against_it() -> None:
+    """Given an EXTENDED_SYS_STATE that comes no more."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=80.0, vehicle_type=QUADROTOR)
+    said = {"armed": Armed.DISARMED, "vehicle_type": QUADROTOR, "acceleration": 0.4}
+    for k in range(1, 14):
+        sink = 0.98 * k
+        parts = {"height": 80.0 - 0.05 * sink * k, "vertical_speed": -sink}
+        story.at(
+            2.0 + 0.1 * k,
+            story.heartbeat(),
+            story.told(**parts, **said, landed_state_age=0.1 * k, attitude_error=0.5),
+        )
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.when(Action.KILL) < 2.9
+
+
 def test_landed_on_a_roof_and_disarmed_it_is_not() -> None:
     story = Story(shipped("multirotor")).ready().fly(2.0, height=30.0)
     said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}

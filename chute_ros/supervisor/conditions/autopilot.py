@@ -83,6 +83,8 @@ class AutopilotCondition(Condition):
         told = [state.heard.vehicle_received + config.vehicle_state_age]
         if self.fact is AutopilotFact.REBOOTED:
             told.append(state.flight.steady_since + flight.STEADY_FOR)
+        if self.fact is AutopilotFact.DISARMED:
+            told.append(flight.flies_until(state))
         if self.fact is AutopilotFact.KILLED_ALOFT:
             names = [name for sign in FALL_SIGNS for name in known_by(sign)]
             limits = config.profile.limits
@@ -142,7 +144,11 @@ def _at_kill(config: SupervisorConfig, known: Killing) -> str:
 
 def _disarmed(config: SupervisorConfig, state: State, now: float) -> Finding:
     said = flight.armed(config, state, now)
-    return Finding(said is Armed.DISARMED, lambda: f"autopilot says {said.name}")
+    flies = not flight.says_off(state, now)
+    besides = " and IN_AIR" if said is Armed.DISARMED and flies else ""
+    return Finding(
+        said is Armed.DISARMED and not flies, lambda: f"autopilot says {said.name}{besides}"
+    )
 
 
 def _emergency(config: SupervisorConfig, state: State, now: float) -> Finding:
