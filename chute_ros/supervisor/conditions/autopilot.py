@@ -83,8 +83,9 @@ class AutopilotCondition(Condition):
         told = [state.heard.vehicle_received + config.vehicle_state_age]
         if self.fact is AutopilotFact.REBOOTED:
             told.append(state.flight.steady_since + flight.STEADY_FOR)
-        if self.fact is AutopilotFact.DISARMED:
-            told.append(flight.flies_until(state))
+        flies_until = flight.flies_until(state)
+        if self.fact is AutopilotFact.DISARMED and not math.isnan(flies_until):
+            told.append(flies_until)
         if self.fact is AutopilotFact.KILLED_ALOFT:
             names = [name for sign in FALL_SIGNS for name in known_by(sign)]
             limits = config.profile.limits
