@@ -29,6 +29,10 @@ MOST_DEVICES = 16
 _CLOCK_SPELL = 1.0
 #: A node that looks later at what its wire brings tells of what was, s.
 MOST_BEHIND = 0.5
+#: A count that another one broke goes on, if it is heard again within so long, s, and so many
+#: heartbeats: that other one is of another node, and of none that restarted. Twice within this
+#: time, s, it is no chance; and the last sign of it counts for so long, s.
+_GOES_ON, _HEARTBEATS, _TWICE_WITHIN, TWO_FOR = 2.0, 200, 3.0, 5.0
 
 
 class LinkJudgement(enum.IntEnum):
@@ -88,6 +92,12 @@ class LinkEvidence:
     #: What it says may be older by so much, s.
     behind: float = 0.0
     seq: int = 0
+    #: The last of the count that another one broke, and when, monotonic s.
+    broken: int = 0
+    broken_at: float = math.nan
+    #: When a broken count went on, monotonic s, and when it did so again: two nodes of one name.
+    went_on_at: float = math.nan
+    two_at: float = math.nan
     #: Monotonic s since when it was heard without a break, after it was lost; NaN: never lost.
     regained_at: float = math.nan
     lost_count: int = 0
@@ -124,6 +134,10 @@ class LinkEvidence:
             f"its node looks {self.behind:.2f} s late at what comes (limit {MOST_BEHIND:g} s): "
             "its computer's processor is short"
         )
+
+    def is_two(self, now: float) -> bool:
+        """Two nodes of its name were heard lately."""
+        return now < self.two_at + TWO_FOR
 
     def silent(self, limit: float, now: float) -> bool:
         """The node itself, not only its device, was not heard for limit s, or never.
@@ -163,7 +177,7 @@ class LinkEvidence:
         if newly_lost or fell_silent:
             lost_count += 1
         return replace(
-            self._with_clock(one.clock_difference, now),
+            self._with_clock(one.clock_difference, now)._with_count(one.seq, now),
             heard=now,
             reported=one.link_state,
             device_healthy=one.device_healthy,
@@ -174,6 +188,16 @@ class LinkEvidence:
             lost_count=lost_count,
             clock_difference=one.clock_difference,
         )
+
+    def _with_count(self, seq: int, now: float) -> LinkEvidence:
+        if seq == self.seq + 1 or math.isnan(self.heard):
+            return self
+        breaks = replace(self, broken=self.seq, broken_at=now)
+        lately = now <= self.broken_at + _GOES_ON
+        if not (lately and self.broken < seq <= self.broken + _HEARTBEATS):
+            return breaks if seq <= self.seq else self
+        twice = now <= self.went_on_at + _TWICE_WITHIN
+        return replace(breaks, went_on_at=now, two_at=now if twice else self.two_at)
 
     def _with_clock(self, difference: float, now: float) -> LinkEvidence:
         if math.isnan(difference):
@@ -208,4 +232,5 @@ class LinkEvidence:
             self.heard + limits.lost_after,
             self.regained_at + limits.regain_after,
             self.released_at + limits.lost_after,
+            self.two_at + TWO_FOR,
         )

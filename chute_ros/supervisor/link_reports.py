@@ -11,7 +11,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import ON_GROUND, Stage, StageEvent
-from chute_ros.supervisor.preflight import RELEASED
+from chute_ros.supervisor.preflight import RELEASED, TWO_NODES
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import pending_in, renew, slots
 from chute_ros.supervisor.turn import Turn
@@ -28,13 +28,17 @@ def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
     known = not math.isnan(before.heard)
     silent = before.silent(limits.lost_after, turn.now)
     _set_evidence(turn, one.link, before.with_heartbeat(one, limits, turn.now))
+    after = turn.state.evidence(one.link)
+    if turn.flight.airborne and after.is_two(turn.now) and not before.is_two(turn.now):
+        turn.warn(f"{one.link}: {TWO_NODES}")
     if turn.own.leading:
         # The alarms of one that follows are those of the leader, which has another clock.
         _check_clock(turn, one.link)
         _check_delay(turn, one.link, before.looks_late)
-    if known and (silent or one.seq <= before.seq):
+    # One whose count goes on, as of two of one name, has heard what was decided.
+    restarted = one.seq <= before.seq and after.went_on_at != turn.now
+    if known and (silent or restarted):
         # It may know of no decision; what still holds for it is decided anew.
-        restarted = one.seq <= before.seq
         why = f"{one.link} {'restarted' if restarted else 'is back'}"
         for slot in slots(turn):
             pending = pending_in(turn, slot)

@@ -31,6 +31,7 @@ _UNABLE = {
     6: "the autopilot reports MAV_STATE_EMERGENCY (need STANDBY or ACTIVE): read its own messages",
     8: "the autopilot reports MAV_STATE_FLIGHT_TERMINATION (need STANDBY or ACTIVE): reboot it",
 }
+TWO_NODES = "two nodes of this name are received: end one, or give it another (-r __node:=NAME)"
 RELEASED = "was released: repack or replace it, then call safety/reset"
 _EPOCH = datetime.date(1970, 1, 1).toordinal()
 #: A wall clock that says less was never set.
@@ -42,6 +43,9 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
     differ."""
     limits = config.limits(link)
     judged = evidence.judged(limits, now)
+    if evidence.is_two(now):
+        # Whatever the two say of their devices.
+        return f"{link}: {TWO_NODES}"
     if judged is LinkJudgement.NEVER_SEEN:
         who = "node" if math.isnan(evidence.heard) else "device"
         return f"{link}: nothing received from its {who}"

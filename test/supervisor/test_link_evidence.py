@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from story import LINK, STANDING, Story
+from story import DOWN, LINK, STANDING, Story, shipped
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, ParachuteState, ParachuteStatus
@@ -20,6 +20,7 @@ from chute_ros.supervisor.link_evidence import (
     LinkLimits,
 )
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import TWO_NODES, block_reasons
 
 J = LinkJudgement
 LIMITS = LinkLimits(stale_after=0.5, lost_after=1.0, regain_after=1.0, startup_grace=10.0)
@@ -272,3 +273,48 @@ def test_between_two_heartbeats_a_link_only_gets_worse_or_is_relied_on_after_its
             assert after is J.OK
         heard = (LinkState.OK, LinkState.UNMONITORED)
         assert evidence.is_heard(LIMITS, now) == (said in heard)
+
+
+# -- two nodes of one name ----------------
+
+
+def numbered(story: Story, *numbers: int, healthy: bool = True) -> None:
+    """Heartbeats with these numbers, one each tenth of a second, of a vehicle that stands."""
+    for number in numbers:
+        beat = replace(story.heartbeat(healthy=healthy), seq=number)
+        story.at(story.t + 0.1, beat, story.told(**DOWN))
+
+
+@pytest.mark.parametrize("second", [3, 100, 101, 104, 5000])
+def test_two_nodes_of_one_name_are_one_clear_reason_and_no_flapping(second: int) -> None:
+    """Given that the second one has no device."""
+    story = Story(shipped("multirotor")).ready()
+    numbered(story, *range(100, 110))
+    assert story.state.stage is Stage.READY
+    for k in range(40):
+        numbered(story, 110 + k)
+        numbered(story, second + 10 + k, healthy=False)
+        assert k < 4 or story.state.stage is Stage.BLOCKED
+    reasons = block_reasons(story.config, story.state, story.t)
+    assert f"{LINK}: {TWO_NODES}" in reasons
+    # Given that the second one is ended, when its last sign is over, then it is READY.
+    numbered(story, *range(150, 210))
+    assert story.state.stage is Stage.READY
+
+
+def test_decisions_are_not_repeated_at_each_word_of_two_nodes() -> None:
+    story = Story(shipped("multirotor")).ready()
+    numbered(story, *range(100, 110))
+    before = len(story.decisions())
+    for k in range(50):
+        numbered(story, 110 + k, 10 + k)
+    assert len(story.decisions()) <= before + 3
+
+
+@pytest.mark.parametrize("numbers", [(1, 2, 3, 4, 5), (1, 3, 4, 6), (3, 1, 2, 3, 4, 5, 6)])
+def test_one_that_restarts_again_and_again_is_not_two(numbers: tuple[int, ...]) -> None:
+    story = Story(shipped("multirotor")).ready()
+    numbered(story, *range(100, 110))
+    for _ in range(3):
+        numbered(story, *numbers)
+        assert not story.state.evidence(LINK).is_two(story.t)
