@@ -6,6 +6,7 @@ from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage, StageEvent, listed
 from chute_ros.supervisor.preflight import block_reasons, not_seen
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import decide, kill_failed, worth_sending
 from chute_ros.supervisor.turn import Turn
 
@@ -13,6 +14,8 @@ from chute_ros.supervisor.turn import Turn
 _OF_LINKS = (StageEvent.LINKS_UNHEALTHY, StageEvent.LINKS_HEALTHY)
 #: Once the parachutes were armed or disarmed, their own status says so within this time, s.
 ARMED_SHOWS = 2.0
+#: What an autopilot was asked for comes within this, s: nothing that comes is said to be missing.
+NOT_SEEN_AFTER = 5.0
 
 
 def check_armed(turn: Turn) -> None:
@@ -63,8 +66,17 @@ def check_links(turn: Turn) -> None:
                     StageEvent.ARMED, f"{', '.join(mute)} was armed, and cannot report otherwise"
                 )
             _show_armed(turn, heard)
-        if not reasons and (text := not_seen(turn.config, turn.state)):
-            turn.log(f"not seen in flight: {text}")
+
+
+def tell_not_seen(turn: Turn) -> None:
+    """Before flight, what the rules will not see; anew as it changes."""
+    on_ground = turn.state.stage in (Stage.READY, Stage.ARMED)
+    if not (on_ground and turn.now >= turn.state.stage_since + NOT_SEEN_AFTER):
+        return
+    text = not_seen(turn.config, turn.state)
+    if text != turn.own.not_seen:
+        turn.own = replace(turn.own, not_seen=text)
+        turn.log(f"not seen in flight: {text or 'nothing any more, all is reported'}")
 
 
 def block_or_release(turn: Turn) -> None:

@@ -17,7 +17,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.action_reports import take_action_report
 from chute_ros.supervisor.airborne import check_vehicle, note_down, note_height
 from chute_ros.supervisor.answers import answer_all
-from chute_ros.supervisor.blocking import block_or_release, check_armed, check_links
+from chute_ros.supervisor.blocking import block_or_release, check_armed, check_links, tell_not_seen
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.deploying import check_deploy, check_kill, check_parachutes
 from chute_ros.supervisor.link_reports import take_heartbeat, take_parachute
@@ -157,6 +157,7 @@ def _check(turn: Turn) -> None:
     check_armed(turn)
     # After the rules, of which one may block flight.
     check_links(turn)
+    tell_not_seen(turn)
     check_kill(turn)
     check_deploy(turn)
     block_or_release(turn)

@@ -161,6 +161,8 @@ class Own:
     #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
     #: -infinity: nobody has looked.
     vehicle_rests_until: float = -math.inf
+    #: What was said last of what the rules do not see of this vehicle.
+    not_seen: str = ""
     #: Who waits for the outcome.
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()

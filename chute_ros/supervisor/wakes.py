@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from chute_ros.supervisor import flight
-from chute_ros.supervisor.blocking import ARMED_SHOWS
+from chute_ros.supervisor.blocking import ARMED_SHOWS, NOT_SEEN_AFTER
 from chute_ros.supervisor.conditions.base import JUST_AFTER
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.deploying import release_due, step_deadline
@@ -24,7 +24,7 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
         # Just after the limit, which still counts as young enough.
         deadlines.append(math.nextafter(since + config.vehicle_state_age, math.inf) + JUST_AFTER)
     if state.stage in (Stage.READY, Stage.ARMED):
-        deadlines.append(state.stage_since + ARMED_SHOWS)
+        deadlines += [state.stage_since + ARMED_SHOWS, state.stage_since + NOT_SEEN_AFTER]
     if state.stage is Stage.STARTUP:
         deadlines += [state.started_at + config.limits(one).startup_grace for one in config.links]
     if state.stage is Stage.DEPLOYED and state.own.deploy_tokens:

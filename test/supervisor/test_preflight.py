@@ -292,9 +292,24 @@ def test_a_rule_of_another_action_blocks_nothing() -> None:
 
 def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen() -> None:
     story = Story(shipped("multirotor")).ready()
+    # Given that an autopilot was asked for them, when they had time to come, not sooner.
+    story.fly(4.8, **DOWN)
+    assert "not seen" not in story.said()
+    story.fly(5.2, **DOWN)
     assert "not seen in flight: no target is reported" in story.said()
     assert "no pressure is reported" in story.said()
     assert not any("not seen" in text for text in story.alarms())
+    # Given that one comes after all.
+    story.fly(6.0, **DOWN, pressure=101_325.0)
+    said = [text for text in story.said().splitlines() if "not seen" in text]
+    assert [("no pressure" in text) for text in said] == [True, False]
+
+
+def test_of_a_vehicle_that_tells_all_nothing_is_said_to_be_not_seen() -> None:
+    story = Story(shipped("multirotor")).ready()
+    all_of_it = {"pressure": 101_325.0, "attitude_error": 1.0, "target_vertical_speed": 0.0}
+    story.fly(8.0, **DOWN, **all_of_it)
+    assert "not seen" not in story.said()
 
 
 @pytest.mark.parametrize(
