@@ -140,6 +140,8 @@ class VehicleMerge:
         #: When the first of them was.
         self._begun = math.inf
         self._words: dict[str, dict[str, _Word]] = {source: {} for source in sources}
+        #: Source -> why its newest message could not be used, and when it came.
+        self._refused: dict[str, tuple[str, float]] = {}
         self._vehicle = VehicleState()
         #: (Part, source) -> when another source last told otherwise.
         self._disputed: dict[tuple[str, str], float] = {}
@@ -330,7 +332,17 @@ class VehicleMerge:
         lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
         faults = () if lost else self._vehicle.faults
         wrong = self._vote.outvoted.values()
-        return (*faults, *self._missing(now), *self._slow(now), *wrong, *self._apart(now))
+        refused = [f"{one}: {why}" for one, why in self._refusals(now).items()]
+        missing, slow = self._missing(now), self._slow(now)
+        return (*faults, *refused, *missing, *slow, *wrong, *self._apart(now))
+
+    def refuse(self, source: str, why: str, now: float) -> None:
+        """A message of this source could not be used."""
+        self._refused[source] = (why, now)
+
+    def _refusals(self, now: float) -> dict[str, str]:
+        """Source -> why its newest messages cannot be used."""
+        return {one: why for one, (why, at) in self._refused.items() if now - at <= SAID_AFTER}
 
     def _apart(self, now: float) -> list[str]:
         """Sources of a vehicle with its motors off that differ as no two sound ones do: in flight
@@ -359,11 +371,15 @@ class VehicleMerge:
         """Sources of which nothing was ever received, once others had the time to begin."""
         if not self._needed_rate or now - self._begun < SAID_AFTER:
             return []
-        return [f"{one} was never received" for one in self._sources if one not in self._rates]
+        known = {*self._rates, *self._refusals(now)}
+        return [f"{one} was never received" for one in self._sources if one not in known]
 
     def _slow(self, now: float) -> list[str]:
         told = []
+        refused = self._refusals(now)
         for source, rates in self._rates.items():
+            if source in refused:
+                continue  # which is why
             slow = [part for part in _JUDGED if part in rates and rates[part].too_slow(now)]
             if slow:
                 each = ", ".join(

@@ -44,14 +44,23 @@ _LENGTH_TOLERANCE = 0.01
 _VOLTAGE_NOT_KNOWN = 65.535
 #: Endings of frame ids whose axes are not those of REP 103: north east down, forward right down.
 _FOREIGN_ENDINGS = ("_ned", "_frd")
+#: REP 105: what stands still, or drifts with what is taken to.
+_OF_THE_WORLD = ("earth", "map", "odom", "world")
 
 
-def foreign_frame(*frame_ids: str) -> str:
-    """The first frame id that says itself that its axes point down (REP 105 adds such endings).
+def wrong_frame(frame_id: str, child_frame_id: str) -> str:
+    """Why what is told in these frames is not what it is read as, in words; empty: it is.
 
-    Empty: none. A height or a pitch from such a frame would have the wrong sign.
+    A frame may say itself that its axes point down (REP 105 adds such endings): a height or a
+    pitch would have the wrong sign. A twist is in the frame of the body (nav_msgs/Odometry): of
+    one in the world's a bank or a pitch would make a sink. child_frame_id: empty, if not said.
     """
-    return next((name for name in frame_ids if name.endswith(_FOREIGN_ENDINGS)), "")
+    down = next((one for one in (frame_id, child_frame_id) if one.endswith(_FOREIGN_ENDINGS)), "")
+    if down:
+        return f"frame {down!r} has its axes pointing down, not as REP 103 has them"
+    if child_frame_id and child_frame_id in (frame_id, *_OF_THE_WORLD):
+        return f"child_frame_id {child_frame_id!r} is no frame of the body, whose twist is needed"
+    return ""
 
 
 def odometry(message: Any) -> Parts:

@@ -163,19 +163,20 @@ class VehicleSources:
     def _heard(self, source: str, parameter: str, read: Reader, message: Any) -> None:
         header = getattr(message, "header", None)
         child = getattr(message, "child_frame_id", "")
-        foreign = readings.foreign_frame(header.frame_id if header else "", child)
-        if foreign:
-            self._refuse(parameter, foreign)
+        wrong = readings.wrong_frame(header.frame_id if header else "", child)
+        if wrong:
+            self._hearing.refuse(source, wrong, self._clock())
+            self._refuse(parameter, wrong)
             return
         self._hearing.hear(source, read(message), self._clock())
         self._wait()
 
-    def _refuse(self, parameter: str, frame: str) -> None:
+    def _refuse(self, parameter: str, why: str) -> None:
         if parameter not in self._refused:
             self._refused.add(parameter)
             self._node.get_logger().error(
-                f"{self._values[parameter]}: frame {frame!r} has its axes pointing down, not as "
-                f"REP 103 has them: not used; set {parameter} to a topic with z up (reported once)"
+                f"{self._values[parameter]}: {why}: not used; set {parameter} to a topic in the "
+                "frames of REP 103 and REP 105 (reported once)"
             )
 
     # -- telling --------------------------------------------------------------------------------

@@ -50,6 +50,10 @@ class VehicleHearing:
         self._merge.hear(source, parts, now)
         self._tell_soon(now)
 
+    def refuse(self, source: str, why: str, now: float) -> None:
+        """A message of a source came that cannot be used; it is a fault of the next picture."""
+        self._merge.refuse(source, why, now)
+
     def tell_now(self, now: float) -> None:
         """The picture by now."""
         self.due, self._told_at = math.inf, now

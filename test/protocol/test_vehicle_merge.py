@@ -83,6 +83,19 @@ def told_at(one, *rates, until=20.0):
     return one.state(until).faults
 
 
+def test_what_cannot_be_used_is_the_whole_reason_as_long_as_it_comes():
+    one = VehicleMerge(("vehicle/state", "odometry"), lost_after=2.5, needed_rate=5.0)
+    why = "frame 'odom_ned' has its axes pointing down, not as REP 103 has them"
+    one.hear("odometry", {"height": (0.0,)}, 10.0)
+    for n in range(50):
+        now = 10.0 + n / 10.0
+        one.hear_state(VehicleState(link_state=LinkState.OK), now)
+        one.refuse("odometry", why, now)
+        assert one.state(now).faults == (f"odometry: {why}",)
+    one.hear_state(VehicleState(link_state=LinkState.OK), 17.1)
+    assert not any(why in fault for fault in one.state(17.1).faults)
+
+
 SELDOM = "imu comes too seldom: {} (need 5 Hz): raise its rate, or take it out of vehicle_sources"
 
 

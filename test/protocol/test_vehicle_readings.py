@@ -193,13 +193,19 @@ def test_of_a_vehicle_state_only_what_was_received_is_known():
     assert known == {"armed", "attitude", "autopilot"}
 
 
-def test_frames_whose_axes_point_down_are_recognised():
-    for frame, child, foreign in (
+def test_frames_that_are_not_what_is_read_are_named():
+    for frame, child, told in (
         ("map", "base_link", ""),
-        ("odom_ned", "", "odom_ned"),
-        ("", "body_frd", "body_frd"),
+        ("odom", "", ""),
+        ("", "", ""),
+        ("odom_ned", "", "frame 'odom_ned' has its axes pointing down"),
+        ("", "body_frd", "frame 'body_frd' has its axes pointing down"),
+        ("map", "odom", "child_frame_id 'odom' is no frame of the body"),
+        ("base_link", "base_link", "child_frame_id 'base_link' is no frame of the body"),
     ):
-        assert readings.foreign_frame(frame, child) == foreign
+        why = readings.wrong_frame(frame, child)
+        assert why.startswith(told), (frame, child)
+        assert bool(why) is bool(told)
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi / 2, math.pi / 2), FLOATS)

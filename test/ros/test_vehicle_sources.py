@@ -175,12 +175,24 @@ def test_sources_that_contradict_each_other_are_told_and_logged_once(bench, list
     assert capfd.readouterr().err.count("attitude in doubt: another source differs") == 1
 
 
-def test_odometry_with_axes_that_point_down_is_not_used(bench, listen):
-    node = listen("odometry")
-    bench.publish(falling_on_its_side("odom_ned"), "odometry")
+@pytest.mark.parametrize(
+    ("frame", "child", "told"),
+    [
+        ("odom_ned", "base_link", "frame 'odom_ned' has its axes pointing down"),
+        ("odom", "odom", "child_frame_id 'odom' is no frame of the body"),
+    ],
+)
+def test_odometry_in_other_frames_is_not_used_and_forbids_take_off(
+    bench, listen, capfd, frame, child, told
+):
+    node, wrong = listen("odometry"), falling_on_its_side(frame)
+    wrong.child_frame_id = child
+    bench.publish(wrong, "odometry")
+    bench.until(lambda: told in capfd.readouterr().err, "the first is refused")
     bench.publish(falling_on_its_side(), "odometry")
     bench.until(lambda: node.told, "the second is told")
-    assert [told.height for told in node.told] == [40.0]
+    assert [one.height for one in node.told] == [40.0]
+    assert node.told[0].faults[0].startswith(f"odometry: {told}")
 
 
 @pytest.mark.parametrize(
