@@ -275,7 +275,7 @@ class EffectLoop(Generic[CommandT]):
         if not success and (hint := self.goal.hint()):
             message = f"{message}; {hint}"
         if remark := self.goal.remark():
-            message = f"{message}; {remark}"
+            message = f"{remark}; {message}"
         outcome = Outcome.CONFIRMED if success else Outcome.FAILED
         self._reports.append(Report(self.token, outcome, message))
         # What nobody has fetched yet is not wanted any more.

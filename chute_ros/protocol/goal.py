@@ -95,7 +95,7 @@ class ConfirmedCommand(Generic[CommandT]):
     even_if_shown: sent although the status shows the effect already.
     sent_by_another: the same has left for another request, and may have had the effect.
     hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
-    remark: what else whoever reads the end must know; empty: nothing.
+    remark: what whoever reads the end must know first; empty: nothing.
     looks: delays after each answer, s, at which refresh is sent; then each retry_interval. An
     answer that comes before the device's own status changes would else be looked at too early.
     otherwise: another goal with the same effect. It is begun beside this one once this one is

@@ -76,7 +76,7 @@ def set_triggers(
     remark: str = "",
 ) -> MavlinkGoal:
     """Arm the selected trigger sources that are set in arm, disarm the other selected ones.
-    remark: what else whoever reads its end must know.
+    remark: what whoever reads its end must know first.
 
     A module may refuse a mask with a source that it does not have. Where all are disarmed each is
     disarmed by itself then; a half of what is to be armed is not.
@@ -130,7 +130,7 @@ def release(
     """Release the first of these parachutes; with force its triggers for commands are armed on the
     way, each by itself: a module may refuse a mask with a source that it does not have. The next
     one follows if it refuses, or has not answered or opened within patience, s.
-    remark: what else whoever reads its end must know.
+    remark: what whoever reads its end must know first.
 
     A status from before the order is believed only while the status stream is alive and the device
     not lost: what a lost device said long ago must not keep us from sending.

@@ -30,8 +30,8 @@ def test_release_is_done_when_the_parachute_itself_says_deployed():
     bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
     assert steps(bench, 1) == ["SENT", "ACCEPTED", "CONFIRMED"]
     assert bench.end(1).finished.message == (
-        "PARACHUTE_STATUS reports deployed after 0.30 s; acknowledged after 0.10 s; "
-        "WARNING: autopilot 1/1 reports armed: the motors may turn"
+        "WARNING: autopilot 1/1 reports armed: the motors may turn; "
+        "PARACHUTE_STATUS reports deployed after 0.30 s; acknowledged after 0.10 s"
     )
     count = len(bench.commands(RELEASE))
     bench.at(10.0)
@@ -237,7 +237,7 @@ def test_a_lost_parachute_is_not_waited_for_and_is_named():
     first.live(6.0).call("arm", 1, False, 0)
     end = first.live(6.5).end(1).finished
     assert end.success
-    assert end.message.endswith("; LOST, and nothing was sent to it: 1/162")
+    assert end.message.startswith("LOST, and nothing was sent to it: 1/162; ")
     # Where all are lost, to the first.
     bench = started(CHUTE, SECOND).at(6.0).call("arm", 1, False, 0)
     (order,) = bench.commands(TRIGGERS)
