@@ -44,6 +44,8 @@ PARTS = {"tilt_deg": "attitude"}
 #: A barometer that rises by so much faster than in the rest of the second, m/s, steps up: its
 #: noise is some decimetres in a tenth of a second.
 _STEP_UP = 10.0
+#: A speed that is the same to the last bit for so long stands, s: ten samples of one that lives.
+_STANDS = 1.0
 #: What a barometer told longer ago says nothing of a fall, s.
 _DROP_WITHIN = 12.0
 #: What an accelerometer tells of the last seconds.
@@ -68,7 +70,7 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
         return felt, why or ("too little was reported lately" if math.isnan(felt) else "")
     if name in _ERRORS:
         return _error(config, state, name, now)
-    if name == SINK_BEYOND_TARGET and state.measured(VERTICAL_SPEED).doubt(VERTICAL_SPEED, now):
+    if name == SINK_BEYOND_TARGET and _speed_is_weak(config, state, now):
         beyond = _sink_beyond_target(config, state, now)
         if not math.isnan(beyond):
             return beyond, ""
@@ -95,6 +97,14 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     if PARTS.get(name, name) in state.heard.disputed:
         return "another source reported otherwise"
     return state.measured(name).doubt(name, now)
+
+
+def _speed_is_weak(config: SupervisorConfig, state: State, now: float) -> bool:
+    """It is in doubt, cannot be used, or does not change, as none of a vehicle that sinks does."""
+    speed = state.measured(VERTICAL_SPEED)
+    limits = config.profile.limits[VERTICAL_SPEED]
+    stands = speed.measured_at - speed.same_since >= _STANDS
+    return stands or bool(speed.doubt(VERTICAL_SPEED, now) or speed.unusable(limits, now))
 
 
 def _sink_beyond_target(config: SupervisorConfig, state: State, now: float) -> float:

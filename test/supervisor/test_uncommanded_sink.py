@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from story import DOWN, Story, pressure_at, shipped
@@ -237,6 +238,40 @@ def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(
         assert story.fired() == []
     else:
         assert story.newest(Action.KILL).rule == "uncommanded sink"
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("target", [0.0, -9.0])
+def test_nor_does_one_that_stands(profile: str, target: float) -> None:
+    """Given a speed of exactly 0 from before it sinks on, with 9 m/s, to the ground."""
+    story, height, sank = Story(shipped(profile)).ready(), 110.0, 0.0
+    for k in range(140):
+        sank = min(9.0, max(0.0, 0.3 * (k - 40)))
+        height -= EVERY * sank
+        parts = {"height": height, "pressure": pressure_at(height + 0.1 * (k % 3)), "tilt": 8.0}
+        parts |= {"acceleration": 9.8 + 0.1 * (k % 3), "target_vertical_speed": target * (k > 40)}
+        report = story.told(**parts).state
+        story.at(
+            story.t + EVERY,
+            story.heartbeat(),
+            i.VehicleReport(replace(report, vertical_speed=0.0 if k > 30 else 0.01 * (k % 3))),
+        )
+    assert bool(story.fired()) is (target == 0.0)
+    if story.fired():
+        assert story.newest(Action.KILL).rule == "uncommanded sink"
+        assert story.when(Action.KILL) < 9.0  # it sinks with 5 m/s from 5.7 s on
+
+
+@AIRCRAFT
+def test_a_speed_that_stands_in_a_hover_ends_nothing(profile: str) -> None:
+    """Given whole cm/s, and a barometer that errs."""
+    story = Story(shipped(profile)).ready()
+    for k in range(300):
+        parts = {"height": 60.0 + 0.2 * (k % 2), "pressure": pressure_at(60.0 + 0.4 * (k % 3))}
+        report = story.told(**parts, target_vertical_speed=0.0, tilt=3.0).state
+        told = i.VehicleReport(replace(report, vertical_speed=0.0))
+        story.at(story.t + EVERY, story.heartbeat(), told)
+    assert story.fired() == []
 
 
 def speeding_up(by: float, lags: float) -> Story:
