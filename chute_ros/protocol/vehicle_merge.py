@@ -16,7 +16,7 @@ barometer sides with one of two speeds, the other source's estimate is not used 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -332,17 +332,14 @@ class VehicleMerge:
         lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
         faults = () if lost else self._vehicle.faults
         wrong = self._vote.outvoted.values()
-        refused = [f"{one}: {why}" for one, why in self._refusals(now).items()]
-        missing, slow = self._missing(now), self._slow(now)
-        return (*faults, *refused, *missing, *slow, *wrong, *self._apart(now))
+        refused = {one: why for one, (why, at) in self._refused.items() if now - at <= SAID_AFTER}
+        others = [f"{one}: {why}" for one, why in refused.items()]
+        others += self._missing(refused, now) + self._slow(refused, now)
+        return (*faults, *others, *wrong, *self._apart(now))
 
     def refuse(self, source: str, why: str, now: float) -> None:
         """A message of this source could not be used."""
         self._refused[source] = (why, now)
-
-    def _refusals(self, now: float) -> dict[str, str]:
-        """Source -> why its newest messages cannot be used."""
-        return {one: why for one, (why, at) in self._refused.items() if now - at <= SAID_AFTER}
 
     def _apart(self, now: float) -> list[str]:
         """Sources of a vehicle with its motors off that differ as no two sound ones do: in flight
@@ -367,19 +364,19 @@ class VehicleMerge:
                 )
         return told
 
-    def _missing(self, now: float) -> list[str]:
-        """Sources of which nothing was ever received, once others had the time to begin."""
+    def _missing(self, but: Container[str], now: float) -> list[str]:
+        """Sources of which nothing was ever received, once others had the time to begin. but: of
+        these it is known why."""
         if not self._needed_rate or now - self._begun < SAID_AFTER:
             return []
-        known = {*self._rates, *self._refusals(now)}
-        return [f"{one} was never received" for one in self._sources if one not in known]
+        silent = [one for one in self._sources if one not in self._rates and one not in but]
+        return [f"{one} was never received" for one in silent]
 
-    def _slow(self, now: float) -> list[str]:
+    def _slow(self, but: Container[str], now: float) -> list[str]:
         told = []
-        refused = self._refusals(now)
         for source, rates in self._rates.items():
-            if source in refused:
-                continue  # which is why
+            if source in but:
+                continue
             slow = [part for part in _JUDGED if part in rates and rates[part].too_slow(now)]
             if slow:
                 each = ", ".join(

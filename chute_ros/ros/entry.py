@@ -113,8 +113,7 @@ def _check_arguments(name: str) -> None:
         sys.exit(0)
     if others:
         text = f"unknown argument {others[0]}: the settings of a node follow --ros-args"
-        print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
-        sys.exit(2)
+        _end(name, f"{text}\nusage: {usage}")
     for path in files_of(sys.argv[1:]):
         # ROS would wait for ever for what comes out of a FIFO; what it cannot open it says itself.
         with contextlib.suppress(OSError):
@@ -130,8 +129,7 @@ def _require_regular(name: str, path: Path) -> None:
     try:
         open_regular(path).close()
     except NotRegularError as error:
-        print(f"{name}: --params-file {path}: {error}", file=sys.stderr)
-        sys.exit(2)
+        _end(name, f"--params-file {path}: {error}")
 
 
 def _init(name: str) -> None:
@@ -159,5 +157,9 @@ def _refused(name: str, error: RuntimeError) -> NoReturn:
             " (ROS_SECURITY_ENABLE is true: docs/guide/security.md lists the needed keystore, "
             "enclave and middleware)"
         )
+    _end(name, text)
+
+
+def _end(name: str, text: str) -> NoReturn:
     print(f"{name}: {text}", file=sys.stderr)
     sys.exit(2)

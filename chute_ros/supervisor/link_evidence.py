@@ -135,6 +135,11 @@ class LinkEvidence:
             "its computer's processor is short"
         )
 
+    def goes_on(self, seq: int, now: float) -> bool:
+        """A heartbeat of this number goes on with a count that another one broke."""
+        lately = now <= self.broken_at + _GOES_ON
+        return lately and seq != self.seq + 1 and 0 < seq - self.broken <= _HEARTBEATS
+
     def is_two(self, now: float) -> bool:
         """Two nodes of its name were heard lately."""
         return now < self.two_at + TWO_FOR
@@ -190,12 +195,12 @@ class LinkEvidence:
         )
 
     def _with_count(self, seq: int, now: float) -> LinkEvidence:
-        if seq == self.seq + 1 or math.isnan(self.heard):
+        goes_on = self.goes_on(seq, now)
+        if not goes_on and (seq > self.seq or math.isnan(self.heard)):
             return self
         breaks = replace(self, broken=self.seq, broken_at=now)
-        lately = now <= self.broken_at + _GOES_ON
-        if not (lately and self.broken < seq <= self.broken + _HEARTBEATS):
-            return breaks if seq <= self.seq else self
+        if not goes_on:
+            return breaks
         twice = now <= self.went_on_at + _TWICE_WITHIN
         return replace(breaks, went_on_at=now, two_at=now if twice else self.two_at)
 

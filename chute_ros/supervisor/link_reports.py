@@ -36,7 +36,7 @@ def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
         _check_clock(turn, one.link)
         _check_delay(turn, one.link, before.looks_late)
     # One whose count goes on, as of two of one name, has heard what was decided.
-    restarted = one.seq <= before.seq and after.went_on_at != turn.now
+    restarted = one.seq <= before.seq and not before.goes_on(one.seq, turn.now)
     if known and (silent or restarted):
         # It may know of no decision; what still holds for it is decided anew.
         why = f"{one.link} {'restarted' if restarted else 'is back'}"

@@ -151,7 +151,7 @@ def _other_kind(config: SupervisorConfig, state: State) -> list[str]:
 
 def _measured_problems(config: SupervisorConfig, state: State, now: float) -> list[str]:
     """What is measured of a vehicle that stands, and cannot be."""
-    used = {name for rule in config.profile.rules for name in rule.measured}
+    used = config.profile.measured
     unfit = state.heard.unfit
     wrong = [f"{name} cannot be used: {why}" for name, why in unfit.items() if name in used]
     wrong += [
@@ -176,7 +176,7 @@ _BLIND = {
 
 def not_seen(config: SupervisorConfig, state: State) -> str:
     """What the rules do not see of this vehicle, as it never told it; empty: nothing."""
-    used = {name for rule in config.profile.rules for name in rule.measured}
+    used = config.profile.measured
     blind = [
         text
         for name, text in _BLIND.items()

@@ -109,6 +109,11 @@ class Profile:
         default_factory=lambda: MappingProxyType(dict(STANDARD_LIMITS))
     )
 
+    @cached_property
+    def measured(self) -> frozenset[str]:
+        """The measurements that its rules rest on."""
+        return frozenset(name for rule in self.rules for name in rule.measured)
+
 
 #: What holds for any vehicle: the motors stop when its parachute asks for it, or is out.
 DEVICE_RULES = (

@@ -90,7 +90,7 @@ def _unguarded(config: SupervisorConfig, state: State, now: float) -> list[str]:
         links = ", ".join(f"{link} {problem}" for link, problem in problems.items())
         told.append(f"{what}: {links}")
     signs = (*FALL_SIGNS, CLIMB_RATE)
-    used = {name for rule in config.profile.rules for name in rule.measured}
+    used = config.profile.measured
     if used & {*signs} and all(unusable(config, state, name, now) for name in signs):
         told.append("nothing reports whether it falls: no vertical speed, acceleration or height")
     return told

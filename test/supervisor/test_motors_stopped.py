@@ -174,14 +174,14 @@ def test_one_that_descends_fast_and_whose_heartbeat_is_wrong_is_not() -> None:
 QUADROTOR, QUADPLANE, UNTOLD = 2, 22, 0
 
 
-def dropped(mav_type: int, stands_after: float, disarms: bool = True) -> Story:
+def dropped(mav_type: int, stands_after: float, heard: bool = True, disarms: bool = True) -> Story:
     """Given that it drops as it was commanded, and says after 0.2 s that it is disarmed; from then
-    on it says IN_AIR for so long, s, and that it stands."""
+    on it says IN_AIR for so long, s, and that it stands. heard: of its landed state."""
     story = Story(shipped("multirotor")).ready().fly(2.0, height=80.0, vehicle_type=mav_type)
     for k in range(1, 14):
-        sink, said = 0.98 * k, {}
+        sink, said = 0.98 * k, {} if heard else {"landed_state_age": 0.1 * k}
         if disarms and k > 2:
-            said = {"armed": Armed.DISARMED}
+            said["armed"] = Armed.DISARMED
             if 0.1 * (k - 2) > stands_after:
                 said["landed_state"] = LandedState.ON_GROUND
         parts = {"height": 80.0 - 0.05 * sink * k, "vertical_speed": -sink, "acceleration": 0.4}
@@ -212,16 +212,7 @@ def test_the_autopilot_of_a_wing_may_go_on_to_say_in_the_air(mav_type: int) -> N
 
 def test_what_it_said_before_is_no_word_against_it() -> None:
     """Given an EXTENDED_SYS_STATE that comes no more."""
-    story = Story(shipped("multirotor")).ready().fly(2.0, height=80.0, vehicle_type=QUADROTOR)
-    said = {"armed": Armed.DISARMED, "vehicle_type": QUADROTOR, "acceleration": 0.4}
-    for k in range(1, 14):
-        sink = 0.98 * k
-        parts = {"height": 80.0 - 0.05 * sink * k, "vertical_speed": -sink}
-        story.at(
-            2.0 + 0.1 * k,
-            story.heartbeat(),
-            story.told(**parts, **said, landed_state_age=0.1 * k, attitude_error=0.5),
-        )
+    story = dropped(QUADROTOR, math.inf, heard=False)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(Action.KILL) < 2.9
 

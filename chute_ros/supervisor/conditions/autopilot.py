@@ -83,9 +83,8 @@ class AutopilotCondition(Condition):
         told = [state.heard.vehicle_received + config.vehicle_state_age]
         if self.fact is AutopilotFact.REBOOTED:
             told.append(state.flight.steady_since + flight.STEADY_FOR)
-        flies_until = flight.flies_until(state)
-        if self.fact is AutopilotFact.DISARMED and not math.isnan(flies_until):
-            told.append(flies_until)
+        if self.fact is AutopilotFact.DISARMED:
+            told += [until for until in (flight.flies_until(state),) if not math.isnan(until)]
         if self.fact is AutopilotFact.KILLED_ALOFT:
             names = [name for sign in FALL_SIGNS for name in known_by(sign)]
             limits = config.profile.limits
@@ -145,11 +144,9 @@ def _at_kill(config: SupervisorConfig, known: Killing) -> str:
 
 def _disarmed(config: SupervisorConfig, state: State, now: float) -> Finding:
     said = flight.armed(config, state, now)
-    flies = not flight.says_off(state, now)
-    besides = " and IN_AIR" if said is Armed.DISARMED and flies else ""
-    return Finding(
-        said is Armed.DISARMED and not flies, lambda: f"autopilot says {said.name}{besides}"
-    )
+    disarmed, off = said is Armed.DISARMED, flight.says_off(state, now)
+    besides = " and IN_AIR" if disarmed and not off else ""
+    return Finding(disarmed and off, lambda: f"autopilot says {said.name}{besides}")
 
 
 def _emergency(config: SupervisorConfig, state: State, now: float) -> Finding:
