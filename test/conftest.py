@@ -32,6 +32,20 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(autouse=True)
+def signals_as_before() -> Iterator[None]:
+    """A program that a test runs in its own process gives back what it did to signals: what later
+    tests start would inherit it, and never end with Ctrl-C."""
+    signals = (signal.SIGINT, signal.SIGTERM)
+    mask, handlers = _blocked(), [signal.getsignal(one) for one in signals]
+    yield
+    assert (_blocked(), [signal.getsignal(one) for one in signals]) == (mask, handlers)
+
+
+def _blocked() -> set[int]:
+    return signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
 def _of_ours(group: str) -> list[EntryPoint]:
     """The entries of this repository."""
     return [one for one in entry_points(group=group) if one.value.startswith("chute_ros.")]

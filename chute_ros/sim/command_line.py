@@ -173,6 +173,7 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
         device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
     link = FaultyLink(device, _knobs(FaultKnobs, options), options.seed)
     wires = _made(device, [make_wire(parse_address(text)) for text in _connections(options)])
+    _check_script(device, options)
     _hold_signals()
     _run_link(device, link, wires, options)
 
@@ -189,6 +190,7 @@ def run_on_can(
     link = CanFaultyLink(device, _knobs(CanFaultKnobs, options), options.seed)
     addresses = [parse_can_address(text, options.bitrate) for text in _connections(options)]
     wires = _made(device, [make_can_wire(address) for address in addresses])
+    _check_script(device, options)
     _hold_signals()
     with beside:
         _run_link(device, link, wires, options)
@@ -263,7 +265,6 @@ def _run_link(
     wires: list[Wire],
     options: argparse.Namespace,
 ) -> None:
-    _check_script(device, options)
     started = time.monotonic()
 
     def show(events: list[Any]) -> None:

@@ -231,6 +231,7 @@ def leader(clock: float) -> State:
             updated_at=clock - 0.5,
             late_count=2,
             vehicle_rests_until=clock + 0.125,
+            not_seen="height",
             kill_tokens=(5,),
             deploy_tokens=(6,),
         ),
@@ -322,8 +323,13 @@ OWN: dict[str, Any] = {
     "faults_told": ("other",),
     "vehicle_rests_until": -math.inf,
 }
-#: Nobody waits at the one that follows, which does not decide.
-NOBODY: dict[str, Any] = {"leading": False, "kill_tokens": (), "deploy_tokens": ()}
+#: Nobody waits at the one that follows, which does not decide, nor says what the rules do not see.
+NOBODY: dict[str, Any] = {
+    "leading": False,
+    "not_seen": "",
+    "kill_tokens": (),
+    "deploy_tokens": (),
+}
 
 
 def test_every_field_is_told_in_the_time_of_the_other_host_or_is_heard_there() -> None:
