@@ -81,8 +81,8 @@ class LeaseKeeper:
         #: Who follows this one, and when that was last said, monotonic s.
         self._followers: dict[str, float] = {}
         self._complained: set[str] = set()
-        #: Who claimed something last, and when, monotonic s.
-        self._other = ("", -math.inf)
+        #: Who claimed something last, and who of the same rank, and when, monotonic s.
+        self._other = self._of_our_rank = ("", -math.inf)
 
     @property
     def leading(self) -> bool:
@@ -133,14 +133,15 @@ class LeaseKeeper:
 
     def trouble(self, now: float) -> str:
         """Trouble with the supervisors' settings; empty: none."""
-        if now - self._namesake_heard < self.config.timeout * RANKS:
+        since = now - self.config.timeout * RANKS
+        if self._namesake_heard > since:
             return f"another supervisor is called {self.config.name} as well: {_APART}"
         name, heard = self._other
-        if not self.config.standby and now - heard < self.config.timeout * RANKS:
+        if not self.config.standby and heard > since:
             return f"{name} runs as well: set hot_standby and different ranks, or stop one"
-        if self.lease.same_rank:
-            name, rank = self.lease.same_rank, self.config.rank
-            return f"{name} has rank {rank} as well: give each supervisor its own"
+        name, heard = self._of_our_rank
+        if heard > since:
+            return f"{name} has rank {self.config.rank} as well: give each supervisor its own"
         return ""
 
     def _own(self, now: float) -> Claim:
@@ -167,7 +168,9 @@ class LeaseKeeper:
             self._complain(f"{other.name} claims {wrong}: ignored")
             return
         self._other = (other.name, now)
-        self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
+        if other.rank == self.config.rank:
+            self._of_our_rank = (other.name, now)
+        self.lease, event = self.lease.heard(self._own(now), other, now)
         if event is not None:
             self._owner.lease_event(event, now)
         if other.leading and self.lease.leader == other.name and told.state:

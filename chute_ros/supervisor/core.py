@@ -116,7 +116,7 @@ def _take_over(turn: Turn, one: i.TakeOver) -> None:
     turn.state = replace(turn.state, epoch=one.epoch)
     # A parachute that this one has heard to be out is not ordered once more.
     check_parachutes(turn)
-    renew_not_begun(turn, "another supervisor took over")
+    renew_not_begun(turn, "decided anew by the supervisor that leads now")
 
 
 def _step_down(turn: Turn, one: i.StepDown) -> None:

@@ -124,8 +124,6 @@ class Lease:
     #: The highest epoch of any claim.
     highest: int = 0
     stand_back_until: float = -math.inf
-    #: Another has the same rank; empty: none.
-    same_rank: str = ""
 
     @classmethod
     def begin(cls, config: LeaseConfig, now: float) -> Lease:
@@ -174,12 +172,9 @@ class Lease:
         """Since when no leader is heard."""
         return self.waiting_since if math.isnan(self.leader_heard) else self.leader_heard
 
-    def heard(
-        self, config: LeaseConfig, own: Claim, other: Claim, now: float
-    ) -> tuple[Lease, LeaseEvent | None]:
+    def heard(self, own: Claim, other: Claim, now: float) -> tuple[Lease, LeaseEvent | None]:
         """Another supervisor's claim came."""
-        same = other.name if other.rank == config.rank else self.same_rank
-        lease = replace(self, highest=max(self.highest, other.epoch), same_rank=same)
+        lease = replace(self, highest=max(self.highest, other.epoch))
         if not other.leading:
             return lease, None
         if self.role is Role.FOLLOWING:

@@ -10,7 +10,6 @@ from chute_msgs.msg import PersonRequest
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from chute_ros.plain_text import plain
 from chute_ros.ros import messages, person_requests, qos
 from chute_ros.tools.chute.order import ServiceAnswer
 
@@ -27,7 +26,7 @@ class PersonRecord:
 
     def ordered(self, service: str, request: Any, who: str) -> RecordedOrder:
         """An order is about to be sent: it is published, with who gives it."""
-        words, by = messages.request_words(request), f"by={plain(who)!r}"
+        words, by = messages.request_words(request), f"by={who!r}"
         told = PersonRequest(
             link=self._link,
             service=service,

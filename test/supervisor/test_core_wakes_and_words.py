@@ -228,7 +228,10 @@ def test_what_is_decided_anew_after_a_takeover_says_so() -> None:
     story.follows()
     story.at(0.2, i.TakeOver(9))
     kill = story.newest(K)
-    assert (kill.epoch, kill.reasons) == (9, ("operator: stop", "another supervisor took over"))
+    assert (kill.epoch, kill.reasons) == (
+        9,
+        ("operator: stop", "decided anew by the supervisor that leads now"),
+    )
 
 
 def test_one_that_follows_knows_since_when_it_is_down_and_what_its_rules_counted() -> None:

@@ -72,17 +72,20 @@ def test_a_height_that_is_set_to_zero_while_disarmed_hides_no_fall() -> None:
     assert fall(story, 45.0, homes, **DOWN) < 2.5
 
 
+@pytest.mark.parametrize(("profile", "lowest"), [("multirotor", 30.0), ("fixed_wing", 60.0)])
 @settings(max_examples=25)
 @given(
-    height=st.floats(30.0, 120.0),
+    above=st.floats(0.0, 90.0),
     homes=st.lists(st.floats(-100.0, 200.0), min_size=1, max_size=20),
     slow=st.floats(-2.0, 2.0),
 )
 def test_whatever_way_home_goes_the_deploy_is_no_later(
-    height: float, homes: list[float], slow: float
+    profile: str, lowest: float, above: float, homes: list[float], slow: float
 ) -> None:
-    fixed = fall(hovering(height), height, [0.0])
-    story = hovering(height)
+    height = lowest + above
+    fixed = fall(hovering(height, profile=profile), height, [0.0])
+    assert math.isfinite(fixed)
+    story = hovering(height, profile=profile)
     drifted = 0.0
     for _ in range(30):
         drifted += EVERY * slow

@@ -99,16 +99,17 @@ def test_an_attitude_that_runs_away_on_the_ground_releases_nothing(
     assert not deployed(teller)
 
 
+@AIRCRAFT
 @settings(max_examples=25)
 @given(
     pushes=st.lists(st.floats(-6.0, 6.0), min_size=2, max_size=6),
     leans=st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=6),
 )
 def test_whatever_way_one_estimator_runs_on_the_ground_nothing_is_released(
-    pushes: list[float], leans: list[float]
+    profile: str, pushes: list[float], leans: list[float]
 ) -> None:
     """Given a barometer that tells 0 m, and a height that runs up as well as down."""
-    teller = told_to("multirotor")
+    teller = told_to(profile)
     teller.stand(1.0, true_height=0.0)
     height = speed = tilt = 0.0
     for k in range(100):
@@ -202,15 +203,16 @@ def test_an_estimator_that_sinks_in_a_hover_is_denied_by_force_at_each_rate(
     assert any("vertical_speed is contradicted" in one for one in story.alarms())
 
 
+@AIRCRAFT
 @settings(max_examples=25)
 @given(
     pushes=st.lists(st.floats(-8.0, 8.0), min_size=2, max_size=6),
     leans=st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6),
 )
 def test_whatever_way_one_estimator_runs_in_a_level_hover_it_ends_no_flight(
-    pushes: list[float], leans: list[float]
+    profile: str, pushes: list[float], leans: list[float]
 ) -> None:
-    teller = told_to("multirotor")
+    teller = told_to(profile)
     teller.stand(1.0, true_height=0.0)
     teller.hover(3.0, 60.0, true_height=60.0)
     height, speed, tilt = 60.0, 0.0, 3.0

@@ -128,6 +128,11 @@ class AutopilotSettings:
         some = any(one.startswith(group) for one in self._values)
         return name in self._denied or (name in self._absent and not some)
 
+    def unread(self, *names: str) -> tuple[str, ...]:
+        """Those of them that were neither answered nor asked for in vain, ever."""
+        known = {*self._values, *self._denied, *self._absent, *self._unanswered}
+        return tuple(name for name in names if name not in known)
+
     @property
     def answers(self) -> bool:
         """The autopilot has answered at least once."""

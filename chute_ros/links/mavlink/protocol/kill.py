@@ -39,6 +39,8 @@ class Way:
     releases: str = ""
     #: It does something else than stop the motors.
     useless: bool = False
+    #: The autopilot's settings that may yet show an obstacle.
+    unread: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -53,15 +55,18 @@ class KillPlan:
         return "; if it is refused or not answered: ".join(map(_described, self._useful()))
 
     def fault(self) -> str:
-        """Why a kill cannot work as it is set up, which forbids take-off; empty: it can."""
+        """Why a kill cannot work as it is set up, or nobody knows yet, which forbids take-off;
+        empty: it can."""
         chosen = next((way for way in self.ways if way.method is self.method), None)
         if chosen is not None and chosen.obstacle:
             return (
                 f"kill_method is {self.method.value}, and {chosen.obstacle}: "
                 f"{_REMEDY[chosen.method]}, or set kill_method to auto"
             )
-        if any(not way.obstacle and not way.releases for way in self.ways):
-            return ""
+        if chosen is not None and chosen.unread:
+            return _not_yet(chosen)
+        if works := [way for way in self.ways if not way.obstacle and not way.releases]:
+            return _not_yet(works[0]) if all(way.unread for way in works) else ""
         why = "; ".join(way.obstacle or way.releases for way in self.ways)
         alone = " without a deploy" if any(not way.obstacle for way in self.ways) else ""
         return f"nothing stops the motors{alone}: {why}; {_REMEDY[KillMethod.FORCED_DISARM]}"
@@ -87,6 +92,10 @@ class KillPlan:
         return tuple(way for way in self.ways if not way.useless)
 
 
+def _not_yet(way: Way) -> str:
+    return f"whether a {NAMES[way.method]} works is not known yet: {way.unread[0]} is being read"
+
+
 _REMEDY = {
     KillMethod.FORCED_DISARM: "set ARMING_REQUIRE to 1",
     KillMethod.FLIGHT_TERMINATION: "set AFS_ENABLE to 1 and AFS_TERM_ACTION to 42",
@@ -109,7 +118,8 @@ def _forced_disarm(settings: AutopilotSettings) -> Way:
     way = KillMethod.FORCED_DISARM
     if settings.get("ARMING_REQUIRE") == 0:
         return Way(way, "ARMING_REQUIRE is 0: the motors run without arming, no disarm stops them")
-    return Way(way)
+    ours = settings.firmware is Firmware.ARDUPILOT
+    return Way(way, unread=settings.unread("ARMING_REQUIRE") if ours else ())
 
 
 def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
@@ -121,8 +131,9 @@ def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
             way, releases="the other effects of termination on this autopilot are not known"
         )
     enabled, action = settings.get("AFS_ENABLE"), settings.get("AFS_TERM_ACTION")
+    unread = settings.unread("AFS_ENABLE", "AFS_TERM_ACTION", "HOME_RESET_ALT")
     if enabled is None and not settings.absent("AFS_ENABLE"):
-        return Way(way, releases="AFS_ENABLE of the autopilot is not known")
+        return Way(way, releases="AFS_ENABLE of the autopilot is not known", unread=unread)
     # The pin is driven as soon as termination is asked for, also where it is refused then.
     releases = _by_pin(settings) if enabled == 1 else ""
     if enabled == 1 and action == _LANDS:
@@ -137,7 +148,7 @@ def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
     elif aeroplane and action != _STOPS:
         is_now = settings.text("AFS_TERM_ACTION")
         obstacle = f"AFS_TERM_ACTION is {is_now} (42 stops the motors): it is refused"
-    return Way(way, obstacle, releases)
+    return Way(way, obstacle, releases, unread=unread)
 
 
 def _by_pin(settings: AutopilotSettings) -> str:

@@ -14,6 +14,7 @@ from link_bench import (
     status,
 )
 
+from chute_ros.links.mavlink.protocol.autopilot_settings import READ_AGAIN
 from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.model import Armed
 from chute_ros.protocol.events import RequestReport, Severity
@@ -300,7 +301,6 @@ def test_the_way_is_said_once_the_settings_are_read():
 )
 def test_settings_that_make_the_kill_impossible_forbid_take_off_by_name(config, settings, fault):
     bench = Bench(**config).hear(PILOT, plane())
-    assert bench.link.vehicle_state(bench.now).faults == ()
     for name, value in settings.items():
         bench.hear(PILOT, setting(name, value))
     (text,) = bench.link.vehicle_state(bench.now).faults
@@ -318,9 +318,48 @@ def test_settings_that_make_the_kill_impossible_forbid_take_off_by_name(config, 
     assert bench.link.vehicle_state(bench.now).faults == ()
 
 
+def waited_for(bench):
+    """The faults that only more answers of the autopilot can take away."""
+    faults = bench.link.vehicle_state(bench.now).faults
+    return [text for text in faults if "not known yet" in text]
+
+
+@pytest.mark.parametrize("make", [ardupilot, plane])
+@pytest.mark.parametrize(
+    ("method", "read"),
+    [
+        (KillMethod.AUTO, ("ARMING_REQUIRE",)),
+        (KillMethod.FORCED_DISARM, ("ARMING_REQUIRE",)),
+        (KillMethod.FLIGHT_TERMINATION, ("AFS_ENABLE", "AFS_TERM_ACTION", "HOME_RESET_ALT")),
+    ],
+)
+def test_until_the_settings_that_decide_a_kill_are_read_take_off_is_forbidden(method, read, make):
+    """READY for a second, and then the setting that makes the kill impossible."""
+    values = {"ARMING_REQUIRE": 1, "AFS_ENABLE": 1, "AFS_TERM_ACTION": 42, "HOME_RESET_ALT": -1}
+    values = {name: setting(name, value) for name, value in values.items()}
+    last = values.pop(read[-1])
+    bench = Bench(kill_method=method, needed_message_rate=0.0)
+    bench.hear(PILOT, make(), *values.values())
+    (text,) = waited_for(bench)
+    assert text.endswith(f"works is not known yet: {read[-1]} is being read")
+    assert waited_for(bench.hear(PILOT, last)) == []
+    # What is read again was known before.
+    bench.stream(READ_AGAIN + 1.0, 0.5, PILOT, make)
+    assert bench.reads()
+    assert waited_for(bench) == []
+
+
+@pytest.mark.parametrize("method", KillMethod)
+def test_an_autopilot_that_answers_nothing_is_waited_for_no_longer_than_it_is_asked(method):
+    bench = Bench(kill_method=method, needed_message_rate=0.0).hear(PILOT, ardupilot())
+    assert waited_for(bench)
+    bench.stream(20.0, 0.1, PILOT, ardupilot)
+    assert waited_for(bench) == []
+
+
 def test_with_its_delivered_settings_no_autopilot_is_kept_from_taking_off():
-    afs = setting("AFS_ENABLE", 0)
-    for told in ([copter()], [unknown()], [ardupilot(), afs], [plane(), afs]):
+    read = setting("ARMING_REQUIRE", 1), setting("AFS_ENABLE", 0)
+    for told in ([copter()], [unknown()], [ardupilot(), *read], [plane(), *read]):
         bench = Bench().hear(PILOT, *told)
         assert bench.link.vehicle_state(bench.now).faults == (), told
     # What termination does on PX4 is said where it was chosen.
