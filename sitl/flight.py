@@ -166,6 +166,13 @@ class Flight:
         self.vehicle.set("SIM_ENGINE_MUL", thrust)
         return self.vehicle.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
 
+    def weaken_motors(self, thrust: float) -> float:
+        """All of four have this share of their thrust from now on; when. PX4's SIH looks at its
+        parameters once a second."""
+        if self.kind != PX4:
+            return self.fail_motors(0b1111, thrust)
+        return self.vehicle.set("SIH_T_MAX", thrust * self.vehicle.get("SIH_T_MAX"))
+
     def see_it_out(self, seconds: float, after: float = 2.0) -> None:
         """Until it is on the ground, or for so long; and a little more."""
         since = time.monotonic()

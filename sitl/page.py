@@ -28,7 +28,8 @@ the supervisor's picture. A fall that only a parachute helps must end with a rel
 the release: 0.3 s); any other flight must see no kill and no release; a blocked vehicle must not
 rise. Deviations stand in the last column, in bold.
 
-A run in which other load of the machine delayed the node or the simulator is flown again.
+A run in which other load of the machine delayed the node or the simulator is flown again. No story
+restarts an autopilot in flight: these simulators begin anew on the ground.
 
 To run it, give the executable that a build of ArduPilot for the board SITL makes (`arducopter`,
 `arduplane`), or `bin/px4` in the folder of a PX4 build for POSIX with the SIH simulator.
