@@ -52,6 +52,35 @@ def test_a_level_sink_that_nobody_commanded_is_deployed_in_time(
     assert any("sinks fast" in one for one in story.alarms())
 
 
+#: Vertical speeds of an ArduPlane (quadplane) with two opposite motors dead in a hover, each 0.5 s,
+#: m/s: one that sank from 40 m to the ground, and one that caught itself.
+SANK = (-0.2, -2.4, -4.4, -5.5, -6.7, -6.2, -4.5, -4.6, -5.4, -6.5, -5.9, -5.0, -5.8, -7.0, -8.7)
+CAUGHT = (-0.2, -1.3, -3.4, -4.9, -6.5, -5.1, -1.0, -0.6, -1.3, -0.8, -1.6, -1.7, -1.2, -1.8, -1.5)
+
+
+@pytest.mark.parametrize(("speeds", "released"), [(SANK, True), (CAUGHT, False)])
+@pytest.mark.parametrize("told", [{"target_vertical_speed": 0.0}, {}])
+def test_one_that_sinks_on_faster_and_slower_in_turn_is_deployed_and_one_that_is_caught_is_not(
+    speeds: tuple[float, ...], released: bool, told: dict[str, float]
+) -> None:
+    """Seen of the first: `uncommanded sink` for 6.3 s, and killed at 9.6 m, too low to deploy."""
+    story, height = Story(shipped("multirotor")).ready(), 40.0
+    for k in range(5 * (len(speeds) - 1)):
+        before, after = speeds[k // 5 : k // 5 + 2]
+        speed = before + (after - before) * (k % 5) / 5.0
+        height += EVERY * speed
+        parts = {"height": height, "vertical_speed": speed, "below_target": 40.0 - height, **told}
+        parts |= {"acceleration": 9.8 + 2.0 * (after - before) + 0.1 * (k % 3), "tilt": 20.0}
+        parts["pressure"] = pressure_at(height + 0.1 * (k % 3))
+        story.at(story.t + EVERY, story.heartbeat(), story.told(**parts))
+        if story.fired():
+            break
+    assert bool(story.fired()) is released
+    if released:
+        assert story.newest(Action.KILL).rule == "sinks on"
+        assert height > 15.0
+
+
 @AIRCRAFT
 @pytest.mark.parametrize("fastest", [8.0, 10.0])
 def test_where_no_target_is_told_it_is_an_alarm(profile: str, fastest: float) -> None:
