@@ -60,7 +60,7 @@ CAUGHT = (-0.2, -1.3, -3.4, -4.9, -6.5, -5.1, -1.0, -0.6, -1.3, -0.8, -1.6, -1.7
 
 @pytest.mark.parametrize(("speeds", "released"), [(SANK, True), (CAUGHT, False)])
 @pytest.mark.parametrize("told", [{"target_vertical_speed": 0.0}, {}])
-def test_one_that_sinks_on_faster_and_slower_in_turn_is_deployed_and_one_that_is_caught_is_not(
+def test_one_that_sinks_on_by_fits_and_starts_is_deployed_and_one_that_is_caught_is_not(
     speeds: tuple[float, ...], released: bool, told: dict[str, float]
 ) -> None:
     """Seen of the first: `uncommanded sink` for 6.3 s, and killed at 9.6 m, too low to deploy."""
