@@ -102,10 +102,14 @@ class Simulator:
     line_rate: int = 0
     #: Six motors: a frame that flies on with five.
     hexa: bool = False
+    process: subprocess.Popen[bytes] = field(init=False)
 
     def __post_init__(self) -> None:
         # PX4: part of a lock file's name and of its ports, on the whole machine.
         self.instance = 10 + os.getpid() % 90
+
+    def start(self) -> None:
+        """On the ground. Whom it calls must listen by then: ArduPilot gives up soon."""
         self.process = self._start()
 
     @property
@@ -133,7 +137,7 @@ class Simulator:
     def restart(self) -> None:
         """As after a loss of power, on the ground."""
         self.end()
-        self.process = self._start()
+        self.start()
 
     def slow_down(self) -> None:
         """PX4's line to the companion computer at the rate that it has; once it has started."""

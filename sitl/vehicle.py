@@ -38,6 +38,8 @@ NAMESPACE = "/sitl"
 NODE, CAN_NODE, SUPERVISOR = "mavlink_parachute", "upf_can", "safety_supervisor"
 _TRUTH_RATE = 25.0  # Hz
 _BENCH = (254, 190)
+#: On a machine that is busy, s.
+_ROUTES_WITHIN = 20.0
 ROUTER, FORWARDS = "router", "autopilot forwards"
 
 
@@ -88,6 +90,8 @@ class Vehicle(Patient):
             self.simulator = Simulator(
                 autopilot, folder, self.ports, setup.settings, setup.line_rate, setup.hexa
             )
+            self._start_router()
+            self.simulator.start()
             made.callback(self.simulator.end)
             self._key = folder / "key"
             self._start_processes()
@@ -253,7 +257,7 @@ class Vehicle(Patient):
 
     # -- processes --------------------------------------------------------------------------------
 
-    def _start_processes(self) -> None:
+    def _start_router(self) -> None:
         ports, setup = self.ports, self.setup
         slow = setup.line_rate and self.autopilot.ardupilot
         stream = "t" if slow else ""
@@ -266,7 +270,15 @@ class Vehicle(Patient):
         networks.append((f"{stream}{self.simulator.bench_port()}", ports.bench_end))
         texts = [",".join(map(str, one)) for one in networks]
         self.keeper.start("router", "sitl.router", str(self.record), *texts)
-        values = {"connection": f"udpout:127.0.0.1:{ports.node}", **setup.node}
+        routes, end = self.keeper.children["router"].log, time.monotonic() + _ROUTES_WITHIN
+        while "routing" not in routes.read_text():
+            if time.monotonic() > end:
+                raise StoryError(f"the router did not begin within {_ROUTES_WITHIN:g} s")
+            self.watch.spin(0.05)
+
+    def _start_processes(self) -> None:
+        setup = self.setup
+        values = {"connection": f"udpout:127.0.0.1:{self.ports.node}", **setup.node}
         if setup.signed:
             self._key.write_text(_KEY.hex())
             os.chmod(self._key, 0o600)
