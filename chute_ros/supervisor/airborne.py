@@ -15,6 +15,7 @@ from chute_ros.supervisor.turn import Turn
 
 #: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
 _UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 0.5, 1.0, 0.2
+_EARLY = "took off before this supervisor was ready, or this supervisor started in flight"
 
 
 def check_vehicle(turn: Turn) -> None:
@@ -25,7 +26,9 @@ def check_vehicle(turn: Turn) -> None:
     if in_air and blocked and flight.low_as_at_take_off(turn.config, turn.state, turn.now):
         return  # it says so because it was ordered to take off, and is kept down
     if in_air and listed(stage, StageEvent.TAKEN_OFF) and _may_take_off(turn):
-        if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
+        if stage is Stage.STARTUP:
+            turn.alarm(_EARLY)
+        elif stage in (Stage.BLOCKED, Stage.KILLING):
             turn.alarm(f"took off although {stage.name}")
         turn.move(StageEvent.TAKEN_OFF)
         _took_off(turn, anew=stage is not Stage.LANDED, armed=stage is Stage.ARMED)

@@ -75,11 +75,15 @@ def check_kill(turn: Turn) -> None:
             # A node that misses the kill must not see the deploy first: it would refuse the
             # kill as older from then on.
             send_again(turn, "kill")
-        waited = turn.now - kill.decided_at
-        why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
-        limit = _limit(turn, kill)
+        before = turn.before.killing.kill
+        if before is not None and before.confirmed:
+            why = told = "kill confirmed before this deploy was wanted"
+        else:
+            waited = turn.now - kill.decided_at
+            why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
+            told = f"{why} ({_limit(turn, kill)})"
         turn.move(StageEvent.DEPLOY_DUE, why)
-        _fire(turn, f"{why} ({limit})")
+        _fire(turn, told)
 
 
 def _kill_again(turn: Turn, kill: Pending) -> None:

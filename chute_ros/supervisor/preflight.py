@@ -21,7 +21,7 @@ from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, Supervis
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
-from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.measurements import PRESSURE_ALTITUDE
 from chute_ros.supervisor.state import CONTRADICTED_FOR, State
 
@@ -226,7 +226,7 @@ def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) ->
     for link in config.deploy_links:
         for status in state.evidence(link).devices.values():
             if status.link_state is LinkState.OK:
-                told = _device(config.preflight, status, day)
+                told = _device(config.preflight, status, day, state.stage in ON_GROUND)
                 reasons += [f"{link} {status.device}: {text}" for text in told]
     reasons += _battery(config, state, now)
     # What is said in the air about the ground is noise; here a still vehicle is known to stand.
@@ -242,7 +242,9 @@ def _clock(config: SupervisorConfig, link: str, difference: float) -> list[str]:
     return []
 
 
-def _device(limits: PreflightLimits, status: ParachuteStatus, day: int) -> list[str]:
+def _device(
+    limits: PreflightLimits, status: ParachuteStatus, day: int, on_ground: bool
+) -> list[str]:
     told = []
     if status.state not in (ParachuteState.READY, ParachuteState.TAKEOFF, ParachuteState.ARMED):
         told.append(f"its state is {status.state.name} (need READY, TAKEOFF or ARMED)")
@@ -255,7 +257,8 @@ def _device(limits: PreflightLimits, status: ParachuteStatus, day: int) -> list[
     self_arms = bool(status.armed_triggers & TriggerFlags.ATS_AUTO_ARM)
     if limits.require_self_arm and not self_arms:
         told.append("ATS_AUTO_ARM is off (need on: it arms itself above its height)")
-    if limits.forbid_ground_cleared and status.safety_flags & SafetyFlags.GROUND_CLEARED:
+    cleared = status.safety_flags & SafetyFlags.GROUND_CLEARED
+    if limits.forbid_ground_cleared and cleared and on_ground:
         told.append("GROUND_CLEARED is set on the ground (need not set)")
     if status.backup_voltage < limits.min_backup_voltage:
         told.append(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from chute_ros.model import Action, Decision
+from chute_ros.model import Action, Decision, LinkState
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
@@ -42,13 +42,43 @@ def state_text(
     config: SupervisorConfig, state: State, reasons: tuple[str, ...], now: float
 ) -> str:
     """The state with its reason in a sentence. reasons: against a take-off (block_reasons)."""
-    text = _stage_text(config, state, reasons, now)
-    if state.stage in ON_GROUND and state.stage is not Stage.ARMED:
-        if armed := ", ".join(map(" ".join, state.armed(config))):
-            text += f"; ARMED all the same: {armed} (safety/arm disarms)"
-        if armed := ", ".join(map(" ".join, state.armed(config, received=False))):
-            text += f"; ARMED when it was last received: {armed}"
+    text = _stage_text(config, state, reasons, now) + _arming_text(config, state, now)
     return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
+
+
+def _arming_text(config: SupervisorConfig, state: State, now: float) -> str:
+    """Which parachutes are armed, wherever the stage by itself lets a person on the ground believe
+    otherwise; it goes on after that."""
+    out = state.released(config)
+    last_said = [*state.armed(config), *state.armed(config, received=False)]
+    silent = [
+        one for one in last_said if one not in out and not _received(config, state, one, now)
+    ]
+    armed = [one for one in last_said if one not in out and one not in silent]
+    if state.stage is Stage.ARMED:
+        links = {link for link, _ in armed}
+        others = [
+            (link, device)
+            for link in config.deploy_links
+            for device in sorted(state.evidence(link).devices)
+            if link not in links and _received(config, state, (link, device), now)
+        ]
+        return f": {_listed(armed)}; NOT armed: {_listed(others)}" if armed and others else ""
+    if state.flight.airborne and state.stage not in ON_GROUND:
+        return ""
+    text = f"; ARMED all the same: {_listed(armed)} (safety/arm disarms)" if armed else ""
+    return text + (f"; ARMED when it was last received: {_listed(silent)}" if silent else "")
+
+
+def _received(config: SupervisorConfig, state: State, one: tuple[str, str], now: float) -> bool:
+    """Its node receives this (link, device), and is received itself."""
+    link, device = one
+    status = state.evidence(link).devices[device]
+    return status.link_state is LinkState.OK and state.hears(config, link, now)
+
+
+def _listed(those: list[tuple[str, str]]) -> str:
+    return ", ".join(map(" ".join, those))
 
 
 def _stage_text(
@@ -96,6 +126,7 @@ def _unguarded(config: SupervisorConfig, state: State, now: float) -> list[str]:
     return told
 
 
+_NOT_OURS = "not by an order of this supervisor"
 _GONE_WORDS = tuple(f"is {one.name}" for one in _GONE)
 
 
@@ -144,16 +175,28 @@ def _what_was_done(config: SupervisorConfig, state: State, now: float) -> str:
 
 
 def _what_is_out(config: SupervisorConfig, state: State, now: float) -> str:
-    """Which parachute is out, since when, at what height, and by whose order."""
-    out = [" ".join(one) for one in sorted(state.newly_released(config, now))]
-    confirmed = [one for one in state.deploying.deploys if one.confirmed]
-    out = out or [_target(one.decision) for one in confirmed[-1:]]
-    who = ", ".join(out) or "a parachute that is not received any more"
-    when = f"{span_text(now - state.stage_since)} ago{_at_height(state.deploying.deploy_height)}"
-    if state.deploying.deploys:
-        decision = state.deploying.deploys[0].decision
-        return f"{who} released {when}, by {_whose(config, decision)}"
-    return f"{who} released {when}, not by an order of this supervisor"
+    """Which parachute is out, since when, at what height, and by whose order each."""
+    deploys = state.deploying.deploys
+    whose: dict[str, list[str]] = {}
+    for link, device in sorted(state.newly_released(config, now)):
+        ordered = [one.decision for one in deploys if _names(one.decision, link, device)]
+        by = f"by {_whose(config, ordered[0])}" if ordered else _NOT_OURS
+        whose.setdefault(by, []).append(f"{link} {device}")
+    if not whose:
+        confirmed = [one for one in deploys if one.confirmed]
+        who = [_target(one.decision) for one in confirmed[-1:]]
+        by = f"by {_whose(config, deploys[0].decision)}" if deploys else _NOT_OURS
+        whose[by] = who or ["a parachute that is not received any more"]
+    when = f" {span_text(now - state.stage_since)} ago{_at_height(state.deploying.deploy_height)}"
+    told = []
+    for by in sorted(whose, key=lambda one: one == _NOT_OURS):
+        told.append(f"{', '.join(whose[by])} released{when}, {by}")
+        when = ""  # of the first; of another it may be another's
+    return "; ".join(told)
+
+
+def _names(decision: Decision, link: str, device: str) -> bool:
+    return link in decision.targets and decision.device in ("", device)
 
 
 def _ordered(

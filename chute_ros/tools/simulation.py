@@ -64,6 +64,8 @@ class RunsAlreadyError(ChuteError):
 def main() -> None:
     """Run it; exit code 2 on a user's mistake, 1 if something ends by itself."""
     chosen = _options().parse_args()
+    if chosen.vehicle == "rocket" and chosen.parachute:
+        _refuse(f"--parachute {chosen.parachute} is of a drone: a rocket has its own; leave it out")
     stay_on_this_host()
     if mistake := surroundings(os.environ, installed_middlewares()).mistake():
         _refuse(mistake)
@@ -106,7 +108,6 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument(
         "--parachute",
         choices=[name for name in vehicles() if name != ROCKET],
-        default="mavlink",
         help="parachute of the drone (default: mavlink)",
     )
     options.add_argument(
@@ -185,7 +186,7 @@ def _command(name: str) -> str:
 
 
 def _vehicle(chosen: argparse.Namespace) -> str:
-    return ROCKET if chosen.vehicle == "rocket" else str(chosen.parachute)
+    return ROCKET if chosen.vehicle == "rocket" else str(chosen.parachute or "mavlink")
 
 
 def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> None:

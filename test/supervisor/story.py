@@ -160,11 +160,14 @@ def parachute(
     deployed: bool = False,
     faults: tuple[str, ...] = (),
     alive: bool = True,
+    armed: bool = False,
 ) -> i.ParachuteReport:
     """A parachute tells its picture; one that is not alive is told of by its node."""
     state = ParachuteState.LAUNCHED if deployed else ParachuteState.READY
     link_state = LinkState.OK if alive else LinkState.LOST
-    status = ParachuteStatus(device, link_state, state, deployed=deployed, faults=faults)
+    status = ParachuteStatus(
+        device, link_state, state, armed=armed, deployed=deployed, faults=faults
+    )
     return i.ParachuteReport(link, status)
 
 

@@ -6,15 +6,17 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from story import FLYING, LINK, START, Story, parachute, shipped, vehicle
+from story import DOWN, FLYING, LINK, STANDING, START, Story, parachute, shipped, vehicle
 
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import Rung
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.state_text import alarms, state_text
 
 UPF = "upf_can"
+NOT_OURS = "not by an order of this supervisor"
 BOTH: dict[str, Any] = {"required_links": (LINK, UPF), "deploy_links": (LINK, UPF)}
 
 
@@ -174,6 +176,72 @@ def test_a_parachute_that_opens_by_itself_was_not_ordered() -> None:
     assert text(story) == (
         f"DEPLOYED: {LINK} 1/161 released 0 s ago at 50.0 m, not by an order of this supervisor"
     )
+
+
+def test_each_parachute_that_is_out_has_the_order_that_was_for_it() -> None:
+    """Given a UPF that launches itself, and a rule that then orders the other one."""
+    story = flying(deploy_ladder=(Rung(LINK),)).fly(1.5)
+    story.at(story.t, parachute(UPF, "33", deployed=True), parachute())
+    assert text(story).endswith("upf_can 33 released 0 s ago at 50.0 m, " + NOT_OURS)
+    story = flying(deploy_ladder=(Rung(LINK),)).fly(1.5)
+    story.at(story.t, i.DeployRequest(5, True, "Anna: it burns"))
+    story.at(story.t, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(story.t, parachute(UPF, "33", deployed=True), parachute(deployed=True))
+    assert text(story) == (
+        f"DEPLOYED: {LINK} 1/161 released 0 s ago at 50.0 m, by operator, forced: Anna: it burns; "
+        f"upf_can 33 released, {NOT_OURS}"
+    )
+
+
+def test_a_deploy_long_after_a_kill_alone_does_not_make_that_kill_slow() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    story.at(1.0, i.KillRequest(5, "operator", "Anna: stop", kill_only=True))
+    story.at(1.01, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    story.fly(9.0, **DOWN)
+    story.at(story.t, i.DeployRequest(6, True, "Anna: it burns"))
+    reasons = story.newest(Action.DEPLOY).reasons
+    assert reasons[1:] == ("kill confirmed before this deploy was wanted",)
+
+
+# Armed, whatever the state
+
+
+def on_the_ground(until: float = 1.0, **armed: bool) -> Story:
+    """Both parachutes received; who is armed."""
+    story = Story(shipped("multirotor", **BOTH))
+    for t in (0.5 * k for k in range(round(2.0 * until) + 1)):
+        beats = [story.heartbeat(), story.heartbeat(UPF), i.VehicleReport(STANDING)]
+        mavlink = parachute(armed=armed.get(LINK, False))
+        story.at(t, *beats, mavlink, parachute(UPF, "33", armed=armed.get(UPF, False)))
+    return story
+
+
+def test_a_kill_on_the_ground_hides_no_armed_parachute() -> None:
+    """The moment when somebody walks up to it."""
+    story = on_the_ground(upf_can=True)
+    story.at(1.1, i.KillRequest(5, "operator", "Anna: stop"))
+    story.at(1.2, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.KILLING
+    assert text(story).endswith("; ARMED all the same: upf_can 33 (safety/arm disarms)")
+    # In the air it is no news.
+    story = flying()
+    story.at(1.1, parachute(UPF, "33", armed=True))
+    story.at(1.2, i.KillRequest(5, "operator", "Anna: stop"))
+    assert "ARMED" not in text(story)
+
+
+def test_one_of_two_that_is_not_armed_is_named() -> None:
+    story = on_the_ground(5.0, upf_can=True)
+    assert text(story) == f"ARMED: upf_can 33; NOT armed: {LINK} 1/161"
+    assert text(on_the_ground(5.0, upf_can=True, mavlink_parachute=True)) == "ARMED"
+
+
+def test_one_whose_node_is_silent_was_armed_when_it_was_last_received() -> None:
+    story = on_the_ground(upf_can=True)
+    for k in range(1, 60):
+        story.at(1.0 + 0.2 * k, story.heartbeat(), i.VehicleReport(STANDING))
+    assert text(story).endswith("; ARMED when it was last received: upf_can 33")
+    assert "all the same" not in text(story)
 
 
 def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once() -> None:

@@ -531,6 +531,14 @@ def test_a_node_that_is_gone_is_told_with_the_parameters(ready):
     assert err == "chute: mavlink_parachute did not answer within 4 s\n"
 
 
+def test_a_supervisor_that_is_gone_is_told_with_the_parameters(ready):
+    """Nothing else names it: the list was shorter, and all was said to be well."""
+    ready.bench.remove(ready.supervisor)
+    code, out, err = run(ready.bench, "parameters", "--timeout", "4")
+    assert (code, out.splitlines()[0]) == (1, "mavlink_parachute")
+    assert err == "chute: a supervisor did not answer within 4 s\n"
+
+
 def test_parameters_show_what_differs_from_the_default_and_a_node_that_is_not_there(ready):
     of_one, all_changed, not_there = run_together(
         ready.bench,

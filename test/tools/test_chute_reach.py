@@ -83,3 +83,10 @@ def test_past_the_supervisor_only_the_link_counts():
     )
     assert warning(order.deploy("a test", link="mavlink_parachute"), picture) == ""
     assert warning(past, None) == ""
+
+
+def test_once_it_was_answered_what_this_process_did_not_receive_is_no_news():
+    """A node that it had not found yet was answering; the warning read as if nothing had come."""
+    unheard, lost = seen(links=TWO, states=[OK, LOST]), seen(states=[LOST])
+    assert warning(order.deploy("a test"), unheard, answered=True) == ""
+    assert warning(order.deploy("a test"), lost, answered=True)

@@ -312,6 +312,7 @@ def test_a_process_that_ends_by_itself_ends_all_with_its_last_words(start, bench
     [
         (("--vehicle", "boat"), "invalid choice: 'boat'"),
         (("--parachute", "umbilical"), "invalid choice: 'umbilical'"),
+        (("--vehicle", "rocket", "--parachute", "upf"), "--parachute upf is of a drone"),
         (("--port", "0"), "port '0': need a whole number from 1 to 65535"),
         (("--port", "web"), "port 'web': need a whole number from 1 to 65535"),
         (("--namespace", "sim car"), "namespace 'sim car': need / and a name of letters"),

@@ -31,6 +31,8 @@ def main(chosen: Chosen) -> int:
             session.until(lambda: _all_found(session, listening.picture), within)
             found = session.links()
             silent = sorted(expected(listening.picture) - {*found})
+            if not listening.picture.states:
+                silent.append("a supervisor")
         for node in found:
             values = parameters_of_node(session, node, within)
             if values is None:

@@ -12,17 +12,18 @@ from chute_ros.tools.chute.words import not_here
 _GONE = (LinkState.LOST.name, LinkState.NEVER_SEEN.name)
 
 
-def warning(order: Order, picture: VehiclePicture | None) -> str:
+def warning(order: Order, picture: VehiclePicture | None, answered: bool = False) -> str:
     """What an order does although it reaches no parachute; empty: it may reach one, needs none, or
-    nothing is known yet."""
+    nothing is known yet. answered: nor is what this process has not received yet any news."""
     if not order.unreached or picture is None:
         return ""
-    why = out_of_reach(picture, order.link)
+    why = out_of_reach(picture, order.link, unheard=not answered)
     return f"{why}: {order.unreached}" if why else ""
 
 
-def out_of_reach(picture: VehiclePicture, link: str = "") -> str:
-    """That no parachute can be reached, and why; empty: one may be. link: of this one alone."""
+def out_of_reach(picture: VehiclePicture, link: str = "", unheard: bool = True) -> str:
+    """That no parachute can be reached, and why; empty: one may be. link: of this one alone.
+    unheard: also where it is only this process that has received none."""
     states = {one.name: one.state for one in picture.links if link in ("", one.name)}
     those = [one for one in picture.parachutes if link in ("", one.link)]
     told = [
@@ -38,6 +39,6 @@ def out_of_reach(picture: VehiclePicture, link: str = "") -> str:
     what = f"THE PARACHUTE OF {link}" if link else "NO PARACHUTE"
     if gone and len(gone) == len(told):
         return f"{what} {'CANNOT' if link else 'CAN'} BE REACHED ({', '.join(gone)})"
-    if those or picture.listened < SETTLE:
+    if those or picture.listened < SETTLE or not unheard:
         return ""
     return f"{what} IS {'NOT ' if link else ''}RECEIVED ({not_here(picture.listened)})"

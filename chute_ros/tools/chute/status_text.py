@@ -198,7 +198,9 @@ def _unusable(picture: VehiclePicture) -> Iterator[StatusLine]:
 
 def link_text(one: LinkView) -> str:
     """Its state and its two ages: the node may live while its device is silent."""
-    parts = [one.state, "device healthy" if one.device_healthy else "device NOT healthy"]
+    parts = [one.state]
+    if one.state == LinkState.OK.name and not is_old(one.age):
+        parts.append("device healthy" if one.device_healthy else "device NOT healthy")
     if one.device_age is not None:
         parts.append(f"device {age_text(one.device_age)}")
     text = ", ".join([*parts, f"node {age_text(one.age)}"])
@@ -207,7 +209,7 @@ def link_text(one: LinkView) -> str:
 
 def parachute_age_text(one: ParachuteView) -> str:
     """Of an output that says nothing it is known only when it was written."""
-    written = "written " if one.link_state == LinkState.UNMONITORED.name else ""
+    written = "written " if one.unmonitored else ""
     return f"{written}{age_text(one.age)}"
 
 
@@ -226,12 +228,13 @@ def _link(one: LinkView) -> StatusLine:
 
 
 def _parachute(one: ParachuteView) -> Iterator[StatusLine]:
-    parts = [
-        one.state,
+    told = [
         "armed" if one.armed else "disarmed",
         "DEPLOYED" if one.deployed else "not deployed",
-        f"link {one.link_state}",
     ]
+    if one.unmonitored:
+        told = ["armed and deployed not known: it tells nothing, and can always fire"]
+    parts = [one.state, *told, f"link {one.link_state}"]
     if one.backup_voltage == one.backup_voltage:
         parts.append(f"backup {one.backup_voltage:.1f} V")
     parts.append(parachute_age_text(one))

@@ -51,7 +51,8 @@ class LinkView:
 
 @dataclass(frozen=True)
 class ParachuteView:
-    """One parachute. released_by: what released it, "NONE" if nothing did or it is not known;
+    """One parachute. armed, deployed: None of one that tells nothing. released_by: what released
+    it, "NONE" if nothing did or it is not known;
     height: m above take-off; packed_date: "YYYY-MM-DD" or empty; age: since its node received it
     (of an output that says nothing: wrote it), s, NaN: never."""
 
@@ -59,15 +60,20 @@ class ParachuteView:
     device: str
     link_state: str
     state: str
-    armed: bool
+    armed: bool | None
     armed_triggers: tuple[str, ...]
-    deployed: bool
+    deployed: bool | None
     released_by: str
     height: float
     backup_voltage: float
     packed_date: str
     faults: tuple[str, ...]
     age: float
+
+    @property
+    def unmonitored(self) -> bool:
+        """It tells nothing: whether it is armed or released nobody knows."""
+        return self.link_state == LinkState.UNMONITORED.name
 
 
 @dataclass(frozen=True)
@@ -277,14 +283,15 @@ def _device_age(heartbeat: ReceivedMessage, now: float) -> float:
 
 
 def _parachute(message: Any, age: float) -> ParachuteView:
+    mute = message.link_state == LinkState.UNMONITORED
     return ParachuteView(
         link=message.link,
         device=message.device,
         link_state=name_of(LinkState, message.link_state),
         state=name_of(ParachuteState, message.state),
-        armed=message.armed,
+        armed=None if mute else message.armed,
         armed_triggers=_names(message.armed_triggers),
-        deployed=message.deployed,
+        deployed=None if mute else message.deployed,
         released_by=name_of(DeploymentTrigger, message.deployment_trigger),
         height=message.height,
         backup_voltage=message.backup_voltage,

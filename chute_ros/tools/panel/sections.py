@@ -225,12 +225,16 @@ def _state_tone(one: ParachuteView) -> str:
 
 
 def _armed(one: ParachuteView) -> str:
+    if one.unmonitored:
+        return "not known: it tells nothing, and can always fire"
     if not one.armed:
         return "no"
     return f"YES: {', '.join(one.armed_triggers)}" if one.armed_triggers else "YES"
 
 
 def _released(one: ParachuteView) -> str:
+    if one.unmonitored:
+        return "not known: it tells nothing"
     if not one.deployed:
         return "no"
     return f"YES, by {_BY[one.released_by]}" if one.released_by in _BY else "YES"

@@ -95,6 +95,29 @@ def test_where_one_does_not_open_the_next_one_is_released(acknowledged):
     assert bench.end(1).finished.success
 
 
+@pytest.mark.parametrize(
+    ("first", "why"),
+    [
+        ({"deployed": 4}, "1/161 is released (parachute_component_id chooses one of several)"),
+        ({"errors": d.PARACHUTE_ERROR_FLAGS_GLOW_WIRE_ERROR}, "1/161 GLOW_WIRE_ERROR"),
+        (None, "1/161 PARACHUTE_STATUS 12.0 s old"),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_with_the_other_of_two_forbids_take_off_and_nothing_in_flight(first, why):
+    """READY, and "device healthy", as long as one of them was."""
+    bench, runtime = of_two(**(first or {})), MavlinkRuntime("x", MavlinkSettings(), Any)
+    bench.hear(PILOT, copter())
+    for _ in range(12 if first is None else 0):
+        bench.at(bench.t + 1.0).hear(SECOND, heartbeat(), status()).hear(PILOT, copter())
+    assert bench.link.chosen_parachute(bench.now).device == "1/162"
+    summary = runtime.summarise(bench.link, bench.now)
+    assert any(one.startswith(why) for one in summary.reasons), summary.reasons
+    assert (summary.link_state, summary.device_healthy) == (LinkState.OK, False)
+    bench.hear(PILOT, copter(True), landed(d.MAV_LANDED_STATE_IN_AIR))
+    assert runtime.summarise(bench.link, bench.now).device_healthy
+
+
 def test_a_parachute_that_is_named_is_the_only_one():
     bench = of_two().hear(CHUTE, status())
     bench.link.deploy(1, False, bench.now, "1/161")
