@@ -65,7 +65,9 @@ def main() -> None:
     """Run it; exit code 2 on a user's mistake, 1 if something ends by itself."""
     chosen = _options().parse_args()
     if chosen.vehicle == "rocket" and chosen.parachute:
-        _refuse(f"--parachute {chosen.parachute} is of a drone: a rocket has its own; leave it out")
+        _refuse(
+            f"--parachute {chosen.parachute} is of a drone, and a rocket has its own: leave it out"
+        )
     stay_on_this_host()
     if mistake := surroundings(os.environ, installed_middlewares()).mistake():
         _refuse(mistake)
