@@ -199,8 +199,10 @@ def _unusable(picture: VehiclePicture) -> Iterator[StatusLine]:
 def link_text(one: LinkView) -> str:
     """Its state and its two ages: the node may live while its device is silent."""
     parts = [one.state]
-    if one.state == LinkState.OK.name and not is_old(one.age):
-        parts.append("device healthy" if one.device_healthy else "device NOT healthy")
+    if not one.device_healthy:
+        parts.append("device NOT healthy")
+    elif one.state == LinkState.OK.name and not is_old(one.age):
+        parts.append("device healthy")
     if one.device_age is not None:
         parts.append(f"device {age_text(one.device_age)}")
     text = ", ".join([*parts, f"node {age_text(one.age)}"])
