@@ -28,6 +28,8 @@ MODES = {
 UNGUARDED = "NOT GUARDED"
 #: Alarms that are published at most.
 _MOST_ALARMS = 16
+#: Also on the ground, where somebody walks up to it.
+_MAY_BE_DOWN = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT)
 #: A link in one of these reaches no parachute, for how long nobody knows.
 _GONE = (LinkJudgement.NEVER_SEEN, LinkJudgement.LOST)
 
@@ -64,7 +66,8 @@ def _arming_text(config: SupervisorConfig, state: State, now: float) -> str:
             if link not in links and _received(config, state, (link, device), now)
         ]
         return f": {_listed(armed)}; NOT armed: {_listed(others)}" if armed and others else ""
-    if state.flight.airborne and state.stage not in ON_GROUND:
+    down = state.stage in _MAY_BE_DOWN and not state.flight.airborne
+    if not (down or state.stage in ON_GROUND):
         return ""
     text = f"; ARMED all the same: {_listed(armed)} (safety/arm disarms)" if armed else ""
     return text + (f"; ARMED when it was last received: {_listed(silent)}" if silent else "")
