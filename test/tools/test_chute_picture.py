@@ -192,6 +192,7 @@ def test_the_ages_of_a_node_and_of_its_silent_device_are_told_apart(heard):
 def test_an_output_that_says_nothing_is_told_to_be_written_and_not_received(heard):
     heard.hears(stamped(state())).hears(stamped(parachute(link_state=5)))
     assert parachute_line(heard.text()).endswith("link UNMONITORED, written <1 s ago")
+    assert "armed and deployed not known: it tells nothing" in parachute_line(heard.text())
 
 
 def test_a_status_without_a_stamp_is_of_a_device_that_was_never_received(heard):
