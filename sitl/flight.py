@@ -156,7 +156,11 @@ class Flight:
         self.vehicle.watch.longest_gap = 0.0
 
     def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
-        """They fail now; when."""
+        """They have this share of their thrust from now on; when. In PX4 a share is of all of
+        them, and its SIH looks at its parameters once a second."""
+        if self.kind == PX4 and thrust:
+            assert mask == 0b1111
+            return self.vehicle.set("SIH_T_MAX", thrust * self.vehicle.get("SIH_T_MAX"))
         if self.kind == PX4:
             number = 420
             sent = self.pilot.fail_motors(mask)
@@ -165,13 +169,6 @@ class Flight:
             return sent
         self.vehicle.set("SIM_ENGINE_MUL", thrust)
         return self.vehicle.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
-
-    def weaken_motors(self, thrust: float) -> float:
-        """All of four have this share of their thrust from now on; when. PX4's SIH looks at its
-        parameters once a second."""
-        if self.kind != PX4:
-            return self.fail_motors(0b1111, thrust)
-        return self.vehicle.set("SIH_T_MAX", thrust * self.vehicle.get("SIH_T_MAX"))
 
     def see_it_out(self, seconds: float, after: float = 2.0) -> None:
         """Until it is on the ground, or for so long; and a little more."""

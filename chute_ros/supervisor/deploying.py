@@ -76,7 +76,7 @@ def check_kill(turn: Turn) -> None:
             # kill as older from then on.
             send_again(turn, "kill")
         before = turn.before.killing.kill
-        if before is not None and before.confirmed:
+        if kill.confirmed and before is not None and before.confirmed:
             why = told = "kill confirmed before this deploy was wanted"
         else:
             waited = turn.now - kill.decided_at

@@ -7,6 +7,7 @@ has it from here: no reader decides for itself whether a vehicle is guarded.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from chute_ros.model import Action, Decision, LinkState
 from chute_ros.plain_text import span_text
@@ -15,6 +16,7 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.readings import unusable
 from chute_ros.supervisor.state import State
@@ -28,7 +30,8 @@ MODES = {
 UNGUARDED = "NOT GUARDED"
 #: Alarms that are published at most.
 _MOST_ALARMS = 16
-#: Also on the ground, where somebody walks up to it.
+_NOT_OURS = "not by an order of this supervisor"
+#: Stages of a vehicle that may have come down, and that somebody walks up to.
 _MAY_BE_DOWN = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT)
 #: A link in one of these reaches no parachute, for how long nobody knows.
 _GONE = (LinkJudgement.NEVER_SEEN, LinkJudgement.LOST)
@@ -51,26 +54,36 @@ def state_text(
 def _arming_text(config: SupervisorConfig, state: State, now: float) -> str:
     """Which parachutes are armed, wherever the stage by itself lets a person on the ground believe
     otherwise; it goes on after that."""
-    out = state.released(config)
-    last_said = [*state.armed(config), *state.armed(config, received=False)]
-    silent = [
-        one for one in last_said if one not in out and not _received(config, state, one, now)
-    ]
-    armed = [one for one in last_said if one not in out and one not in silent]
-    if state.stage is Stage.ARMED:
-        links = {link for link, _ in armed}
-        others = [
-            (link, device)
-            for link in config.deploy_links
-            for device in sorted(state.evidence(link).devices)
-            if link not in links and _received(config, state, (link, device), now)
-        ]
-        return f": {_listed(armed)}; NOT armed: {_listed(others)}" if armed and others else ""
     down = state.stage in _MAY_BE_DOWN and not state.flight.airborne
-    if not (down or state.stage in ON_GROUND):
+    if state.stage is Stage.ARMED or not (down or state.stage in ON_GROUND):
         return ""
+    armed, silent = _armed(config, state, now)
     text = f"; ARMED all the same: {_listed(armed)} (safety/arm disarms)" if armed else ""
     return text + (f"; ARMED when it was last received: {_listed(silent)}" if silent else "")
+
+
+def _armed_in_part(config: SupervisorConfig, state: State, now: float) -> str:
+    """Which parachutes are armed, where those of another link that is received are not."""
+    armed, _ = _armed(config, state, now)
+    links = {link for link, _ in armed}
+    others = [
+        (link, device)
+        for link in config.deploy_links
+        for device in sorted(state.evidence(link).devices)
+        if link not in links and _received(config, state, (link, device), now)
+    ]
+    return f"{_listed(armed)}; NOT armed: {_listed(others)}" if armed and others else ""
+
+
+def _armed(
+    config: SupervisorConfig, state: State, now: float
+) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """(link, device) of those that say that they are armed, and of those that said so last and are
+    silent; one that is out is neither."""
+    out = state.released(config)
+    said = [*state.armed(config), *state.armed(config, received=False)]
+    armed = [one for one in said if one not in out and _received(config, state, one, now)]
+    return armed, [one for one in said if one not in out and one not in armed]
 
 
 def _received(config: SupervisorConfig, state: State, one: tuple[str, str], now: float) -> bool:
@@ -129,7 +142,6 @@ def _unguarded(config: SupervisorConfig, state: State, now: float) -> list[str]:
     return told
 
 
-_NOT_OURS = "not by an order of this supervisor"
 _GONE_WORDS = tuple(f"is {one.name}" for one in _GONE)
 
 
@@ -156,8 +168,11 @@ def _warnings(config: SupervisorConfig, state: State, now: float) -> list[str]:
 
 
 def _what_was_done(config: SupervisorConfig, state: State, now: float) -> str:
-    """The kill or the deploy of this state: what, when, by whose order and why; empty: none."""
+    """The kill or the deploy of this state: what, when, by whose order and why; what is armed, if
+    not all is; empty: none."""
     kill, deploys = state.killing.kill, state.deploying.deploys
+    if state.stage is Stage.ARMED:
+        return _armed_in_part(config, state, now)
     if state.stage is Stage.KILLING and kill is not None:
         what = "the motors are off" if kill.confirmed else "the motors are being stopped"
         height = _at_height(state.killing.killed_height)
@@ -182,20 +197,23 @@ def _what_is_out(config: SupervisorConfig, state: State, now: float) -> str:
     deploys = state.deploying.deploys
     whose: dict[str, list[str]] = {}
     for link, device in sorted(state.newly_released(config, now)):
-        ordered = [one.decision for one in deploys if _names(one.decision, link, device)]
-        by = f"by {_whose(config, ordered[0])}" if ordered else _NOT_OURS
-        whose.setdefault(by, []).append(f"{link} {device}")
+        ordered = [one for one in deploys if _names(one.decision, link, device)]
+        whose.setdefault(_by(config, ordered), []).append(f"{link} {device}")
     if not whose:
         confirmed = [one for one in deploys if one.confirmed]
         who = [_target(one.decision) for one in confirmed[-1:]]
-        by = f"by {_whose(config, deploys[0].decision)}" if deploys else _NOT_OURS
-        whose[by] = who or ["a parachute that is not received any more"]
+        whose[_by(config, deploys)] = who or ["a parachute that is not received any more"]
     when = f" {span_text(now - state.stage_since)} ago{_at_height(state.deploying.deploy_height)}"
     told = []
     for by in sorted(whose, key=lambda one: one == _NOT_OURS):
         told.append(f"{', '.join(whose[by])} released{when}, {by}")
         when = ""  # of the first; of another it may be another's
     return "; ".join(told)
+
+
+def _by(config: SupervisorConfig, ordered: Sequence[Pending]) -> str:
+    """By whose order, the first of these."""
+    return f"by {_whose(config, ordered[0].decision)}" if ordered else _NOT_OURS
 
 
 def _names(decision: Decision, link: str, device: str) -> bool:

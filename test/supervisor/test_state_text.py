@@ -201,6 +201,15 @@ def test_a_deploy_long_after_a_kill_alone_does_not_make_that_kill_slow() -> None
     story.at(story.t, i.DeployRequest(6, True, "Anna: it burns"))
     reasons = story.newest(Action.DEPLOY).reasons
     assert reasons[1:] == ("kill confirmed before this deploy was wanted",)
+    # Motors that turn again are killed anew, and of that kill nothing is confirmed.
+    at_once = {"kill_to_deploy_delay": 0.0, "low_kill_to_deploy_delay": 0.0}
+    story = Story(shipped("multirotor", **at_once)).flying().fly(1.0)
+    story.at(1.0, i.KillRequest(5, "operator", "Anna: stop", kill_only=True))
+    story.at(1.01, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    story.fly(9.0, height=50.0)
+    story.at(story.t, i.DeployRequest(6, True, "Anna: it burns"))
+    reasons = story.newest(Action.DEPLOY).reasons
+    assert reasons[1:] == ("kill not confirmed after 0.00 s (limit 0 s)",)
 
 
 # Armed, whatever the state

@@ -88,5 +88,5 @@ def test_past_the_supervisor_only_the_link_counts():
 def test_once_it_was_answered_what_this_process_did_not_receive_is_no_news():
     """A node that it had not found yet was answering; the warning read as if nothing had come."""
     unheard, lost = seen(links=TWO, states=[OK, LOST]), seen(states=[LOST])
-    assert warning(order.deploy("a test"), unheard, answered=True) == ""
-    assert warning(order.deploy("a test"), lost, answered=True)
+    assert warning(order.deploy("a test"), unheard, unheard=False) == ""
+    assert warning(order.deploy("a test"), lost, unheard=False)

@@ -23,7 +23,7 @@ _NO_PARACHUTE = (
     "no parachute was received: check its power and wiring, parachute_system_id, and that its "
     f"HEARTBEAT (type MAV_TYPE_PARACHUTE, {dialect.MAV_TYPE_PARACHUTE}) reaches this connection"
 )
-_ONE = "parachute_component_id chooses one of several"
+_ONE_OF_SEVERAL = "parachute_component_id chooses one of several"
 _HEARTBEATS_ALONE = (
     f"sends heartbeats but no PARACHUTE_STATUS ({dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS}), "
     "although requested: check its "
@@ -77,10 +77,12 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         if chosen is not None:
             state, age = chosen.liveness.state, chosen.liveness.age(now)
             reasons = _why_unhealthy(chosen, now)
-            reasons += link.deaf_parachutes(now) if on_ground else []
-            others = [one for one in link.parachutes.all() if one is not chosen and on_ground]
-            # Whoever has two counts on two; one that was taken off is named no more.
-            reasons += [f"{why} ({_ONE})" for one in others for why in _why_unhealthy(one, now)]
+            if on_ground:
+                reasons += link.deaf_parachutes(now)
+                # Whoever has two counts on two.
+                others = [one for one in link.parachutes.all() if one is not chosen]
+                wrong = [why for one in others for why in _why_unhealthy(one, now)]
+                reasons += [f"{why} ({_ONE_OF_SEVERAL})" for why in wrong]
         reasons += doubts
         if reasons:
             reasons += autopilot

@@ -57,7 +57,7 @@ def main(chosen: Chosen) -> int:
             print(f"\nchute: {told}", file=sys.stderr)
             raise
         if listening is not None and not (warned or answer.success):
-            _warn(order, listening, answered=True)
+            _warn(order, listening, unheard=False)
     try:
         told = json_text(_told(order, chosen.namespace, answer)) if chosen.json else ""
         print(told or answer_text(order, answer), flush=True)
@@ -76,9 +76,9 @@ def _ask(session: ChuteSession, listening: Listening, order: Order) -> None:
     ask(order.name, order.word, [*lines, *filter(None, [warning(order, picture)])])
 
 
-def _warn(order: Order, listening: Listening, answered: bool = False) -> bool:
+def _warn(order: Order, listening: Listening, unheard: bool = True) -> bool:
     """Whether it was told that no parachute is reached."""
-    if told := warning(order, listening.view(), answered):
+    if told := warning(order, listening.view(), unheard):
         print(f"chute: {order.name}: {told}", file=sys.stderr)
     return bool(told)
 

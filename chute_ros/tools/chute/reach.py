@@ -12,12 +12,12 @@ from chute_ros.tools.chute.words import not_here
 _GONE = (LinkState.LOST.name, LinkState.NEVER_SEEN.name)
 
 
-def warning(order: Order, picture: VehiclePicture | None, answered: bool = False) -> str:
+def warning(order: Order, picture: VehiclePicture | None, unheard: bool = True) -> str:
     """What an order does although it reaches no parachute; empty: it may reach one, needs none, or
-    nothing is known yet. answered: nor is what this process has not received yet any news."""
+    nothing is known yet. unheard: as of out_of_reach; once it is answered that is no news."""
     if not order.unreached or picture is None:
         return ""
-    why = out_of_reach(picture, order.link, unheard=not answered)
+    why = out_of_reach(picture, order.link, unheard)
     return f"{why}: {order.unreached}" if why else ""
 
 

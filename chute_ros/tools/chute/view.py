@@ -52,9 +52,9 @@ class LinkView:
 @dataclass(frozen=True)
 class ParachuteView:
     """One parachute. armed, deployed: None of one that tells nothing. released_by: what released
-    it, "NONE" if nothing did or it is not known;
-    height: m above take-off; packed_date: "YYYY-MM-DD" or empty; age: since its node received it
-    (of an output that says nothing: wrote it), s, NaN: never."""
+    it, "NONE" if nothing did or it is not known; height: m above take-off; packed_date:
+    "YYYY-MM-DD" or empty; age: since its node received it (of an output that says nothing: wrote
+    it), s, NaN: never."""
 
     link: str
     device: str
@@ -73,7 +73,7 @@ class ParachuteView:
     @property
     def unmonitored(self) -> bool:
         """It tells nothing: whether it is armed or released nobody knows."""
-        return self.link_state == LinkState.UNMONITORED.name
+        return self.armed is None
 
 
 @dataclass(frozen=True)

@@ -129,9 +129,10 @@ class AutopilotSettings:
         return name in self._denied or (name in self._absent and not some)
 
     def unread(self, *names: str) -> tuple[str, ...]:
-        """Those of them that were neither answered nor asked for in vain, ever."""
+        """Those of them that this firmware has and that were neither answered nor asked for in
+        vain, ever."""
         known = {*self._values, *self._denied, *self._absent, *self._unanswered}
-        return tuple(name for name in names if name not in known)
+        return tuple(name for name in names if name in NAMES[self.firmware] and name not in known)
 
     @property
     def answers(self) -> bool:

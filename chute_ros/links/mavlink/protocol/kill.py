@@ -118,8 +118,7 @@ def _forced_disarm(settings: AutopilotSettings) -> Way:
     way = KillMethod.FORCED_DISARM
     if settings.get("ARMING_REQUIRE") == 0:
         return Way(way, "ARMING_REQUIRE is 0: the motors run without arming, no disarm stops them")
-    ours = settings.firmware is Firmware.ARDUPILOT
-    return Way(way, unread=settings.unread("ARMING_REQUIRE") if ours else ())
+    return Way(way, unread=settings.unread("ARMING_REQUIRE"))
 
 
 def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
