@@ -82,7 +82,8 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
                 # Whoever has two counts on two.
                 others = [one for one in link.parachutes.all() if one is not chosen]
                 wrong = [why for one in others for why in _why_unhealthy(one, now)]
-                reasons += [f"{why} ({_ONE_OF_SEVERAL})" for why in wrong]
+                # Beside them: each is told once, as its own status says it too.
+                reasons += [*wrong, _ONE_OF_SEVERAL] if wrong else []
         reasons += doubts
         if reasons:
             reasons += autopilot

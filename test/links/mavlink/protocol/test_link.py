@@ -98,7 +98,7 @@ def test_where_one_does_not_open_the_next_one_is_released(acknowledged):
 @pytest.mark.parametrize(
     ("first", "why"),
     [
-        ({"deployed": 4}, "1/161 is released (parachute_component_id chooses one of several)"),
+        ({"deployed": 4}, "1/161 is released"),
         ({"errors": d.PARACHUTE_ERROR_FLAGS_GLOW_WIRE_ERROR}, "1/161 GLOW_WIRE_ERROR"),
         (None, "1/161 PARACHUTE_STATUS 12.0 s old"),
     ],
@@ -113,6 +113,12 @@ def test_what_is_wrong_with_the_other_of_two_forbids_take_off_and_nothing_in_fli
     assert bench.link.chosen_parachute(bench.now).device == "1/162"
     summary = runtime.summarise(bench.link, bench.now)
     assert any(one.startswith(why) for one in summary.reasons), summary.reasons
+    assert "parachute_component_id chooses one of several" in summary.reasons
+    # The supervisor finds each again among those that its status told, and tells it once.
+    faults = {
+        f"1/161 {fault}" for fault in bench.link.parachutes.named("1/161").status(bench.now).faults
+    }
+    assert faults <= {*summary.reasons}
     assert (summary.link_state, summary.device_healthy) == (LinkState.OK, False)
     bench.hear(PILOT, copter(True), landed(d.MAV_LANDED_STATE_IN_AIR))
     assert runtime.summarise(bench.link, bench.now).device_healthy
