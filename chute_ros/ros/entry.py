@@ -26,6 +26,12 @@ _SWITCH_INTERVAL = 0.0002
 #: A node that is to end is gone after this at the latest, s (Fast DDS issue 6513: as it takes its
 #: participant down it may wait for a callback for ever).
 _ENDS_WITHIN = 10
+#: What ROS reads such an argument as; of one that it cannot read it tells the place alone.
+_READ_AS = {
+    "remap rule": "OLD:=NEW, names of letters, digits and _ alone, a namespace with / before it",
+    "parameter override rule": "PARAMETER:=VALUE, an empty text as \"PARAMETER:=''\"",
+    "log level": "debug, info, warn, error or fatal",
+}
 
 
 def run(name: str, place: str, actions: bool = False) -> None:
@@ -152,6 +158,9 @@ def _refused(name: str, error: RuntimeError) -> NoReturn:
     if text.startswith("["):
         # Of arguments that it does not know ROS tells the list alone.
         text = f"ROS has no argument {text.strip('[]')}: a parameter is set by -p NAME:=VALUE"
+    for kind, needed in _READ_AS.items():
+        if f"parse {kind}: " in text:
+            text = f"{text.partition('. Error: ')[0]}: need {needed}"
     if _security():
         text += (
             " (ROS_SECURITY_ENABLE is true: docs/guide/security.md lists the needed keystore, "

@@ -50,12 +50,14 @@ REFUSED = [
     (("--params-file", "FOLDER/fifo"), "fifo: no regular file but a FIFO"),
     (("--params-file",), "Couldn't parse trailing --params-file flag"),
     (("-r",), "Couldn't parse trailing -r flag"),
-    (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
+    (("-r", "word"), "Couldn't parse remap rule: '-r word': need OLD:=NEW, names of letters, dig"),
+    (("-r", "parachute/status:=of-drone-1"), "names of letters, digits and _ alone, a namespace"),
+    (("--log-level", "loud"), "'--log-level loud': need debug, info, warn, error or fatal"),
     (
         ("mode:=SHADOW",),
         "ROS has no argument 'mode:=SHADOW': a parameter is set by -p NAME:=VALUE",
     ),
-    (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
+    (("-p", "call_tries"), "rule: '-p call_tries': need PARAMETER:=VALUE, an empty text as"),
     (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
     (("-p", "nobody:mode:=SHADOW"), "'-p nobody:mode:=SHADOW' is for a node /nobody, this"),
     (("-p", "url:=x"), "'-p url:=x': /"),
@@ -82,6 +84,15 @@ def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
         (line,) = err.splitlines()
         assert line.startswith(f"{node}: "), arguments
         assert words in line, arguments
+
+
+def test_a_namespace_that_ros_cannot_read_is_told_with_the_fix() -> None:
+    code, (*_of_ros, line) = start("upf_can", "-r", "__ns:=/drone-1")
+    assert code == 2
+    assert line == (
+        "upf_can: Failed to parse ROS arguments: Couldn't parse remap rule: '-r __ns:=/drone-1': "
+        "need OLD:=NEW, names of letters, digits and _ alone, a namespace with / before it"
+    )
 
 
 def test_a_setting_that_ros_would_take_for_a_new_name_of_topics_is_told() -> None:
