@@ -846,3 +846,49 @@ def test_one_that_snaps_over_and_sinks_faster_for_it_is_released(
         told = {"vertical_speed": speed + teller.noise(0.2), "tilt": turned + teller.noise(1.0)}
         teller.tell(height=height, **told, force=math.hypot(thrust, drag), **truth)
     assert teller.story.t - begun <= (1.2 if profile == "multirotor" else 1.8) + EVERY
+
+
+# -- a rocket, whose height is its barometer's and whose speed its satellites' -----------------
+
+
+@settings(max_examples=25)
+@given(
+    pushes=st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=6),
+    climbs=st.lists(st.floats(-300.0, 300.0), min_size=2, max_size=6),
+)
+def test_whatever_a_rocket_tells_of_its_motion_as_it_stands_fires_nothing(
+    pushes: list[float], climbs: list[float]
+) -> None:
+    """Given its key turned, and a flight computer that says that it stands."""
+    teller, height, speed = told_to("rocket"), 0.0, 0.0
+    for k in range(150):
+        speed += EVERY * pushes[k * len(pushes) // 150]
+        height += EVERY * climbs[k * len(climbs) // 150]
+        standing = {"armed": Armed.ARMED, "landed_state": LandedState.ON_GROUND, "force": 9.8}
+        teller.tell(height=height, vertical_speed=speed, **standing)
+    assert teller.story.fired() == []
+
+
+@pytest.mark.parametrize("wrong", ["height", "speed"])
+@settings(max_examples=15)
+@given(pushes=st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=6))
+def test_whatever_one_sensor_of_a_rocket_that_climbs_tells_fires_nothing(
+    wrong: str, pushes: list[float]
+) -> None:
+    """Given a boost of 2 s to 200 m/s, and a coast until 20 m/s are left."""
+    teller, height, speed, errs, strays = told_to("rocket"), 0.0, 0.0, 0.0, 0.0
+    teller.tell(armed=Armed.ARMED, landed_state=LandedState.ON_GROUND, force=9.8, height=0.0)
+    for k in range(200):
+        boosts = k < 20
+        speed += EVERY * (100.0 if boosts else -9.8)
+        height += EVERY * speed
+        errs += EVERY * pushes[k * len(pushes) // 200]
+        strays += EVERY * errs
+        teller.tell(
+            height=height + (strays if wrong == "height" else 0.0),
+            vertical_speed=speed + (errs if wrong == "speed" else teller.noise(0.2)),
+            force=110.0 if boosts else 2.0,
+        )
+    assert speed > 20.0
+    assert teller.story.state.stage is Stage.IN_FLIGHT
+    assert teller.story.fired() == []
