@@ -1,5 +1,6 @@
 """The simulators as executables: without ROS, with every mistake told in one line."""
 
+import importlib
 import re
 import signal
 import socket
@@ -14,12 +15,15 @@ from printing_process import PrintingProcess
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.sim import command_line
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.transport.signing_key import signing_from_file
 
 PARACHUTE = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
 AUTOPILOT = "chute_ros.sim.sim_autopilot"
-BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
+UPF = "chute_ros.links.upf.simulator.sim_upf"
+RELAY = "chute_ros.links.relay.simulator.sim_relay"
+FLIGHT_COMPUTER = "chute_ros.links.umbilical.simulator.sim_flight_computer"
 DIALECT = "chute_ros.protocol.mavlink.dialect"
 LOCAL = "127.0.0.1"
 MSG_DEFS = Path(__file__).parents[2] / "msg_defs"
@@ -50,23 +54,30 @@ def start(environment):
 
 
 @pytest.fixture
-def fail(environment):
-    """What it says to a mistake: (exit code, stderr)."""
+def call(monkeypatch, capsys):
+    """What a simulator says in this process before it runs: (exit code, stdout, stderr)."""
+    monkeypatch.setenv("COLUMNS", "500")
+    monkeypatch.setattr(command_line, "_hold_signals", lambda: pytest.fail("it runs"))
 
-    def run(name, *arguments):
-        done = subprocess.run(
-            [sys.executable, "-m", name, *arguments],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=20.0,
-            check=False,
-        )
-        assert done.stdout == ""
-        assert "Traceback" not in done.stderr
-        return done.returncode, done.stderr
+    def run(module, *arguments):
+        monkeypatch.setattr(sys, "argv", [module, *arguments])
+        with pytest.raises(SystemExit) as ended:
+            importlib.import_module(module).main()
+        return ended.value.code, *capsys.readouterr()
 
     return run
+
+
+def ended(environment, *arguments):
+    """Python with these arguments, in a process that ends by itself."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=20.0,
+        check=False,
+    )
 
 
 def port_in(line):
@@ -75,17 +86,10 @@ def port_in(line):
 
 
 def test_rclpy_is_really_out_of_reach_in_these_tests(environment):
-    done = subprocess.run(
-        [sys.executable, "-c", "import rclpy"],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "no ROS here: rclpy" in done.stderr
+    assert "no ROS here: rclpy" in ended(environment, "-c", "import rclpy").stderr
 
 
-@BOTH
+@pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
 def test_it_runs_without_ros_answers_and_ends_on_an_interrupt(simulator, start, await_until):
     running = start(simulator, "--connection", f"udpin:{LOCAL}:0")
     await_until(lambda: running.said("is open"), "it is open")
@@ -120,14 +124,10 @@ PACKAGES = {
     [
         (PARACHUTE, ("--connection", f"udpin:{LOCAL}:0"), ()),
         (AUTOPILOT, ("--connection", f"udpin:{LOCAL}:0"), ()),
-        ("chute_ros.links.relay.simulator.sim_relay", (), ()),
+        (RELAY, (), ()),
+        (FLIGHT_COMPUTER, (), ("--telem-path", str(MSG_DEFS / "telem"))),
         (
-            "chute_ros.links.umbilical.simulator.sim_flight_computer",
-            (),
-            ("--telem-path", str(MSG_DEFS / "telem")),
-        ),
-        (
-            "chute_ros.links.upf.simulator.sim_upf",
+            UPF,
             ("--connection", f"mcast:0:{free_udp_ports(1)[0]}"),
             ("--dsdl-path", str(MSG_DEFS / "dsdl" / "flyfire")),
         ),
@@ -289,11 +289,7 @@ sys.meta_path.insert(0, Interrupted())
 
 @pytest.mark.parametrize(
     ("simulator", "module"),
-    [
-        (PARACHUTE, DIALECT),
-        (AUTOPILOT, DIALECT),
-        ("chute_ros.links.upf.simulator.sim_upf", "numpy"),
-    ],
+    [(PARACHUTE, DIALECT), (AUTOPILOT, DIALECT), (UPF, "numpy")],
 )
 def test_a_library_that_passes_over_ctrl_c_does_not_keep_it_running(
     simulator, module, environment, tmp_path
@@ -301,90 +297,65 @@ def test_a_library_that_passes_over_ctrl_c_does_not_keep_it_running(
     """It ran on after the Ctrl-C of a launch, until launch sent SIGTERM 5 s later."""
     with (tmp_path / "sitecustomize.py").open("a") as file:
         file.write(IMPORTING.replace("MODULE", module))
-    done = subprocess.run(
-        [sys.executable, "-m", simulator, "--at", "5:what it refuses, and ends"],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=20.0,
-        check=False,
-    )
+    done = ended(environment, "-m", simulator, "--at", "5:what it refuses, and ends")
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
-@BOTH
-def test_help_names_every_action_and_form(simulator, environment):
-    done = subprocess.run(
-        [sys.executable, "-m", simulator, "--help"],
-        env={**environment, "COLUMNS": "500"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    for word in ("udpin:HOST:PORT", "serial:PATH[:BAUD]", "--loss", "--seed", "mute", "reboot"):
-        assert word in done.stdout
+@pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT, UPF, RELAY, FLIGHT_COMPUTER])
+def test_help_names_every_action_and_form(simulator, call):
+    words = ["--control PATH", "cut (nothing passes", "restore", "reboot", "--seed"]
+    if simulator in (PARACHUTE, AUTOPILOT):
+        words += ["udpin:HOST:PORT", "serial:PATH[:BAUD]", "--loss", "mute"]
+    code, out, _ = call(simulator, "--help")
+    assert (code, [word for word in words if word not in out]) == (0, [])
 
 
-@BOTH
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--at", "reboot"), "--at 'reboot': need SECONDS:ACTION, for example 5:reboot"),
-        (("--at", "5:"), "--at '5:': need SECONDS:ACTION"),
-        (("--at", "soon:reboot"), "--at 'soon:reboot': need SECONDS:ACTION"),
-        (("--at", "nan:reboot"), "--at 'nan:reboot': need SECONDS:ACTION"),
-        (("--at=-1:reboot",), "--at '-1:reboot': need SECONDS:ACTION"),
-        (("--at", "5:explode"), "action 'explode' is not known: need one of "),
-        (("--at", "5:reboot=now"), "action 'reboot=now': reboot takes no argument"),
-        (("--connection", "udp:1"), "connection 'udp:1' is not understood: need udpin:HOST:PORT"),
-        (("--connection", f"udpin:{LOCAL}:0", "--connection", "tcpin::0"), "'tcpin::0' is not"),
-        (("--loss", "30"), "loss is 30.0: need 0 to 1"),
-        (("--system-id", "300"), "id '300': need 1 to 255"),
-        (("--system-id", "one"), "id 'one': need 1 to 255"),
-        (("--signing-key-file", "/no/key"), "--signing-key-file: /no/key: No such file"),
-        (("--warp", "9"), "unrecognized arguments: --warp 9"),
-    ],
-)
-def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
-    code, text = fail(simulator, *arguments)
-    assert code == 2
-    assert said in text.splitlines()[-1]
+#: Of every simulator on MAVLink.
+MISTAKES = [
+    (("--at", "reboot"), "--at 'reboot': need SECONDS:ACTION, for example 5:reboot"),
+    (("--at", "5:"), "--at '5:': need SECONDS:ACTION"),
+    (("--at", "soon:reboot"), "--at 'soon:reboot': need SECONDS:ACTION"),
+    (("--at", "nan:reboot"), "--at 'nan:reboot': need SECONDS:ACTION"),
+    (("--at=-1:reboot",), "--at '-1:reboot': need SECONDS:ACTION"),
+    (("--at", "5:explode"), "action 'explode' is not known: need one of "),
+    (("--at", "5:reboot=now"), "action 'reboot=now': reboot takes no argument"),
+    (("--connection", "udp:1"), "connection 'udp:1' is not understood: need udpin:HOST:PORT"),
+    (("--connection", f"udpin:{LOCAL}:0", "--connection", "tcpin::0"), "'tcpin::0' is not"),
+    (("--loss", "30"), "loss is 30.0: need 0 to 1"),
+    (("--system-id", "300"), "id '300': need 1 to 255"),
+    (("--system-id", "one"), "id 'one': need 1 to 255"),
+    (("--signing-key-file", "/no/key"), "--signing-key-file: /no/key: No such file"),
+    (("--warp", "9"), "unrecognized arguments: --warp 9"),
+]
+OWN_MISTAKES = [
+    (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is no argument of error"),
+    (PARACHUTE, ("--at", "5:deploy"), "'' is no argument of deploy: need deploy=one of MANUAL, "),
+    (PARACHUTE, ("--packed-date", "2024-13-01"), "packed date '2024-13-01' is no date YYYY-"),
+    (PARACHUTE, ("--packed-date", "yesterday"), "packed date 'yesterday' is no date YYYY-MM"),
+    (PARACHUTE, ("--clear-height", "nan"), "--clear-height: m 'nan': need 0 to 10000"),
+    (PARACHUTE, ("--clear-height", "high"), "--clear-height: m 'high': need 0 to 10000"),
+    (PARACHUTE, ("--armed", "256"), "mask '256': need 0 to 255"),
+    (PARACHUTE, ("--ats-arm-altitude", "300"), "m '300': need 0 to 255"),
+    (PARACHUTE, ("--error", "TIRED"), "invalid choice: 'TIRED'"),
+    (AUTOPILOT, ("--at", "5:takeoff=high"), "argument of takeoff: need takeoff=0 to 10000 m"),
+    (AUTOPILOT, ("--at", "5:takeoff=nan"), "'nan' is no argument of takeoff: need "),
+]
 
 
 @pytest.mark.parametrize(
     ("simulator", "arguments", "said"),
-    [
-        (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is no argument of error"),
-        (
-            PARACHUTE,
-            ("--at", "5:deploy"),
-            "'' is no argument of deploy: need deploy=one of MANUAL, ",
-        ),
-        (PARACHUTE, ("--packed-date", "2024-13-01"), "packed date '2024-13-01' is no date YYYY-"),
-        (PARACHUTE, ("--packed-date", "yesterday"), "packed date 'yesterday' is no date YYYY-MM"),
-        (PARACHUTE, ("--clear-height", "nan"), "--clear-height: m 'nan': need 0 to 10000"),
-        (PARACHUTE, ("--clear-height", "high"), "--clear-height: m 'high': need 0 to 10000"),
-        (PARACHUTE, ("--armed", "256"), "mask '256': need 0 to 255"),
-        (PARACHUTE, ("--ats-arm-altitude", "300"), "m '300': need 0 to 255"),
-        (PARACHUTE, ("--error", "TIRED"), "invalid choice: 'TIRED'"),
-        (
-            AUTOPILOT,
-            ("--at", "5:takeoff=high"),
-            "'high' is no argument of takeoff: need takeoff=0 to 10000 m",
-        ),
-        (AUTOPILOT, ("--at", "5:takeoff=nan"), "'nan' is no argument of takeoff: need "),
-    ],
+    [*((one, *mistake) for mistake in MISTAKES for one in (PARACHUTE, AUTOPILOT)), *OWN_MISTAKES],
 )
-def test_a_mistake_in_its_own_options_is_told_too(simulator, arguments, said, fail):
-    code, text = fail(simulator, *arguments)
-    assert code == 2
-    assert said in text.splitlines()[-1]
+def test_a_mistake_is_told_in_one_line(simulator, arguments, said, call):
+    code, out, err = call(simulator, *arguments)
+    assert (code, out) == (2, "")
+    assert said in err.splitlines()[-1]
 
 
-def test_a_dialect_that_is_not_built_is_told_in_one_line(fail, environment, tmp_path):
+def test_a_dialect_that_is_not_built_is_told_in_one_line(environment, tmp_path):
     (tmp_path / "chute_msgs").mkdir()
     (tmp_path / "chute_msgs" / "__init__.py").touch()
-    code, text = fail(PARACHUTE)
-    assert code == 2
-    assert "colcon build --base-paths src src/chute_ros/msg_defs" in text
-    assert len(text.splitlines()) == 1
+    done = ended(environment, "-m", PARACHUTE)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "colcon build --base-paths src src/chute_ros/msg_defs" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
