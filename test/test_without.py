@@ -108,21 +108,25 @@ def test_a_rule_that_alone_saves_a_flight_is_told_and_one_that_decided_nothing_i
         (["--python", "/no/such"], "'/no/such' is no command here"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(arguments: list[str], told: str) -> None:
-    done = started(*arguments)
-    assert done.returncode == 2
-    assert told in done.stderr.splitlines()[-1]
+def test_a_mistake_is_told_in_one_line(
+    arguments: list[str],
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["without", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        without.main()
+    assert ended.value.code == 2
+    assert told in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_process_that_ends_by_itself_is_started_again_and_then_told() -> None:
-    done = started("--flights", "1", "--python", "false", "rocket: critical sink")
+    command = [sys.executable, without.__file__, "--flights", "1", "--python", "false"]
+    done = subprocess.run(
+        [*command, "rocket: critical sink"], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
         "without: one of its processes ended 3 times: exit code 1"
     )
-
-
-def started(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """The command, at its end."""
-    command = [sys.executable, without.__file__, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
