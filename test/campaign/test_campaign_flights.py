@@ -196,8 +196,12 @@ def test_the_same_seed_is_the_same_flight() -> None:
     assert repr(once) == repr(again)
 
 
-def test_every_scenario_is_drawn_within_its_bounds() -> None:
-    every = [draw(seed) for seed in range(3000)]
+@pytest.fixture(scope="module")
+def every() -> list[Scenario]:
+    return [draw(seed) for seed in range(3000)]
+
+
+def test_every_scenario_is_drawn_within_its_bounds(every: list[Scenario]) -> None:
     assert {one.vehicle for one in every} == set(vehicles())
     assert {one.profile for one in every} == set(PROFILES)
     assert {one.failure for one in every} == set(Failure) - {Failure.TAPE}
@@ -219,8 +223,7 @@ def faults(one: Scenario) -> int:
     return sum(not isinstance(f, HomeMove) and f not in again for f in one.faults)
 
 
-def test_every_world_is_drawn() -> None:
-    every = [draw(seed) for seed in range(3000)]
+def test_every_world_is_drawn(every: list[Scenario]) -> None:
     flown = [one.manoeuvre.kind for one in every if one.manoeuvre]
     assert set(flown) == {"flip", "throw", "dive", "descent", "transition", "landing"}
     assert {one.manoeuvre.slope == 0.0 for one in every if one.lands} == {False, True}
