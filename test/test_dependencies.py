@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -26,7 +27,8 @@ COMES_ALONG = {
 NOT_IMPORTED = {"msgpack", "pymavlink"}
 
 
-def imported() -> set[str]:
+@functools.cache
+def imported() -> frozenset[str]:
     """Top-level modules that the package and its launch files import, without ours."""
     found: set[str] = set()
     for path in (*ROOT.glob("chute_ros/**/*.py"), *ROOT.glob("launch/*.py")):
@@ -35,7 +37,7 @@ def imported() -> set[str]:
                 found |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 found.add(node.module.partition(".")[0])
-    return found - set(sys.stdlib_module_names) - {"chute_ros"}
+    return frozenset(found - sys.stdlib_module_names - {"chute_ros"})
 
 
 def in_package_xml() -> set[str]:

@@ -143,9 +143,10 @@ def fall(vehicle: DescribedVehicle, case: Case, height: float = 0.0) -> Fall:
     return ObservedFlight(flight, shipped(vehicle), vehicle.soft_landing).fall()
 
 
-def needed(vehicle: DescribedVehicle, name: str, **more: object) -> float:
+@functools.cache
+def needed(vehicle: DescribedVehicle, name: str) -> float:
     """The least height of seed 1."""
-    case = case_of(vehicle, name, **more)
+    case = case_of(vehicle, name)
     return needed_height(lambda h: fall(vehicle, case, h), vehicle.soft_landing, 1).height
 
 
@@ -237,8 +238,8 @@ def test_an_aeroplane_has_failures_of_its_own() -> None:
 
 def test_the_same_seed_is_the_same_flight_and_another_is_not() -> None:
     campaign = Campaign(DRONE, FOLDER, seed=3, flights=2)
-    assert fly(campaign, [0, 1]) == fly(campaign, [0, 1])
     one, other = fly(campaign, [0, 1])
+    assert fly(campaign, [0]) == [one]
     assert one.height != other.height or one.usual != other.usual
     later = replace(campaign, seed=4)
     assert fly(later, [0]) == [other]
