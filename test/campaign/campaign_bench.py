@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.campaign.flight import Flown, fly
+from chute_ros.campaign.judge import Count, judge
 from chute_ros.campaign.scenario import Failure, Fault, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.virtual_node import Acted
@@ -39,6 +40,19 @@ def rocket(failure: Failure, *faults: Fault, **more: Any) -> Scenario:
 def flown(failure: Failure, *faults: Fault, **more: Any) -> Flown:
     """The same, flown."""
     return fly(scenario(failure, *faults, **more), SHIPPED)
+
+
+def correct(one: Flown) -> Flown:
+    """One that is counted as correct."""
+    judged = judge(one)
+    assert judged.count is Count.CORRECT, judged.why
+    return one
+
+
+def left_alone(one: Flown) -> Flown:
+    """The same, in which nothing was killed or released."""
+    assert not fired(correct(one))
+    return one
 
 
 def fired(one: Flown) -> list[Acted]:

@@ -6,7 +6,7 @@ import math
 from functools import partial
 
 import pytest
-from campaign_bench import FOLDER, SHIPPED, fired, flown, rocket, scenario
+from campaign_bench import FOLDER, SHIPPED, correct, fired, flown, left_alone, rocket, scenario
 from combinations import combinations
 
 from chute_ros.campaign import campaign
@@ -47,8 +47,7 @@ BUNDLE = partial(campaign.fly_bundle, FOLDER)
 def test_what_falls_is_killed_and_released_in_time(
     failure: Failure, profile: str, vehicle: str
 ) -> None:
-    end = flown(failure, profile=profile, vehicle=vehicle, height=90.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(failure, profile=profile, vehicle=vehicle, height=90.0))
     assert end.truth.at < end.killed < end.released < end.truth.latest
     assert [one.decision.action for one in fired(end)] == [Action.KILL, Action.DEPLOY]
 
@@ -57,24 +56,20 @@ def test_what_falls_is_killed_and_released_in_time(
     ("vehicle", "failure"), combinations(AIRCRAFT, [Failure.NOTHING, Failure.HANG])
 )
 def test_what_flies_on_is_left_alone(failure: Failure, vehicle: str) -> None:
-    end = flown(failure, gusts=1.0, vehicle=vehicle)
-    assert judge(end).count is Count.CORRECT
-    assert not fired(end)
+    end = left_alone(flown(failure, gusts=1.0, vehicle=vehicle))
     assert math.isnan(end.released)
     assert not end.truth.falls
 
 
 @pytest.mark.parametrize("failure", UNBRAKED)
 def test_a_rocket_without_its_drogue_gets_one(failure: Failure) -> None:
-    end = fly(rocket(failure, failure_at=4.0), SHIPPED)
-    assert judge(end).count is Count.CORRECT
+    end = correct(fly(rocket(failure, failure_at=4.0), SHIPPED))
     assert end.truth.at < end.killed < end.released < end.truth.latest
     assert [one.decision.action for one in fired(end)] == [Action.KILL, Action.DEPLOY]
 
 
 def test_a_rocket_whose_drogue_comes_by_itself_is_left_alone() -> None:
-    end = fly(rocket(Failure.NOTHING), SHIPPED)
-    assert judge(end).count is Count.CORRECT
+    end = correct(fly(rocket(Failure.NOTHING), SHIPPED))
     assert not end.truth.falls
     assert Action.DEPLOY not in [one.decision.action for one in end.acted]
     # Nothing may burn any more under a canopy.
@@ -107,8 +102,7 @@ def test_a_power_failure_is_seen_by_nobody() -> None:
 
 
 def test_a_upf_that_may_releases_itself_when_the_power_fails() -> None:
-    end = flown(Failure.POWER, vehicle="upf", aps=True)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.POWER, vehicle="upf", aps=True))
     assert end.truth.at < end.released < end.truth.latest
 
 
@@ -120,16 +114,14 @@ def test_a_cable_that_is_cut_for_the_whole_fall_is_named() -> None:
 
 def test_a_supervisor_that_dies_as_the_vehicle_fails_goes_on_in_time() -> None:
     dies = Stop("supervisor", 1.1, 1.0, dies=True)
-    end = flown(Failure.MOTOR, dies, height=100.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, dies, height=100.0))
     assert len({one.decision.epoch for one in end.acted}) == 2
 
 
 @pytest.mark.parametrize("dies", [False, True])
 def test_a_standby_takes_over_from_one_that_stops(dies: bool) -> None:
     stop = Stop("supervisor", 0.9, 8.0, dies=dies)
-    end = flown(Failure.MOTOR, stop, height=100.0, standby=True)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, stop, height=100.0, standby=True))
     takes_over = "became leader, epoch 17: no leader's heartbeat was received for the lease's time"
     assert takes_over in [text for _, text in end.said]
     # Before the one that stopped is back.
@@ -138,13 +130,12 @@ def test_a_standby_takes_over_from_one_that_stops(dies: bool) -> None:
 
 def test_a_node_that_dies_as_the_vehicle_fails_goes_on_in_time() -> None:
     dies = Stop("mavlink_parachute", 1.0, 0.5, dies=True)
-    assert judge(flown(Failure.MOTOR, dies, height=100.0)).count is Count.CORRECT
+    correct(flown(Failure.MOTOR, dies, height=100.0))
 
 
 def test_a_controller_that_dies_does_not_keep_the_trigger_from_firing() -> None:
     dies = Stop("controller", 1.2, 6.0, dies=True)
-    end = flown(Failure.MOTOR, dies, vehicle="upf", height=110.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, dies, vehicle="upf", height=110.0))
     assert end.released < end.truth.latest
 
 
@@ -153,21 +144,18 @@ def test_a_controller_that_dies_does_not_keep_the_trigger_from_firing() -> None:
     combinations([-3600.0, -1.0, 1.0, 3600.0], ["supervisor", "mavlink_parachute"]),
 )
 def test_a_wall_clock_that_is_set_makes_no_decision_too_old(who: str, by: float) -> None:
-    end = flown(Failure.MOTOR, ClockJump(who, 0.9, by))
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, ClockJump(who, 0.9, by)))
     assert end.killed < end.released < end.truth.latest
 
 
 def test_a_supervisor_on_an_overloaded_host_is_in_time() -> None:
     stalls = Stalls("supervisor", 0.0, 6.0, 0.5)
-    end = flown(Failure.MOTOR, stalls, height=110.0)
-    assert judge(end).count is Count.CORRECT
+    correct(flown(Failure.MOTOR, stalls, height=110.0))
 
 
 @pytest.mark.parametrize("vehicle", AIRCRAFT)
 def test_a_person_deploys_once(vehicle: str) -> None:
-    end = flown(Failure.NOTHING, vehicle=vehicle, arms=True, person=Person("deploy", 1.0))
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.NOTHING, vehicle=vehicle, arms=True, person=Person("deploy", 1.0)))
     assert end.released < end.up + 1.5
     assert [one.decision.action for one in fired(end)] == [Action.KILL, Action.DEPLOY]
     assert end.answer.startswith("True: ")
@@ -175,8 +163,7 @@ def test_a_person_deploys_once(vehicle: str) -> None:
 
 def test_what_a_person_kills_falls_and_is_released() -> None:
     """The deploy follows the kill at once, so that there is no time to fall."""
-    end = flown(Failure.NOTHING, person=Person("kill", 1.0))
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.NOTHING, person=Person("kill", 1.0)))
     assert end.up + 1.0 < end.released < end.up + 1.3
 
 
@@ -188,7 +175,7 @@ def test_what_a_person_wants_and_no_parachute_hears_is_missed() -> None:
 
 def test_one_sensor_that_reads_nothing_deploys_nothing() -> None:
     fault = SensorFault("force", "zero", 0.5, 6.0)
-    assert judge(flown(Failure.NOTHING, fault)).count is Count.CORRECT
+    correct(flown(Failure.NOTHING, fault))
 
 
 def test_the_same_seed_is_the_same_flight() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from campaign_bench import FOLDER, SHIPPED, flown, rocket, scenario
+from campaign_bench import FOLDER, SHIPPED, correct, flown, rocket, scenario
 
 from chute_ros.campaign import comparison
 from chute_ros.campaign.channel import Spell
@@ -55,8 +55,7 @@ def with_peer(peer: MakePeer, failure: Failure, *faults: Fault, **more: object) 
 def test_a_motor_failure_at_60_m_is_released_by_each(
     peer: MakePeer, rule: str, kill_to_deploy: float
 ) -> None:
-    end = with_peer(peer, Failure.MOTOR)
-    assert judge(end).count is Count.CORRECT
+    end = correct(with_peer(peer, Failure.MOTOR))
     assert bare_count(end) is Count.CORRECT
     kill, deploy = end.acted
     assert (kill.decision.action, deploy.decision.action) == (Action.KILL, Action.DEPLOY)
@@ -67,8 +66,7 @@ def test_a_motor_failure_at_60_m_is_released_by_each(
 
 @pytest.mark.parametrize("peer", PEERS)
 def test_what_flies_well_is_left_alone_by_each(peer: MakePeer) -> None:
-    end = with_peer(peer, Failure.NOTHING, gusts=1.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(with_peer(peer, Failure.NOTHING, gusts=1.0))
     assert not end.acted
 
 
@@ -143,7 +141,7 @@ def test_a_flip_that_is_flown_in_acro_terminates_nothing() -> None:
     """At 360 degrees a second it is upside down for half a second."""
     flips = Manoeuvre("flip", 360.0, 1.0)
     for peer in (ArduCopter, Px4):
-        assert judge(with_peer(peer, Failure.NOTHING, manoeuvre=flips)).count is Count.CORRECT
+        correct(with_peer(peer, Failure.NOTHING, manoeuvre=flips))
 
 
 def test_home_that_moves_up_makes_a_peer_take_itself_to_be_low() -> None:

@@ -1,4 +1,5 @@
-"""Scenarios as text: what was written reads back, and what is none is told so."""
+"""Scenarios as text: what was written reads back, and what is none is told so; and scenarios that
+a person writes by hand."""
 
 from __future__ import annotations
 
@@ -10,7 +11,16 @@ from campaign_bench import scenario
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.manoeuvre import landing
-from chute_ros.campaign.scenario import Failure, Person, Stop, WayFault
+from chute_ros.campaign.scenario import (
+    Failure,
+    Person,
+    Scenario,
+    Stop,
+    Vehicle,
+    WayFault,
+    flown_vehicles,
+    ways_of,
+)
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
@@ -81,3 +91,18 @@ def test_what_is_none_is_told_with_its_name(text: str, words: str) -> None:
     with pytest.raises(RecordError, match=r"old\.json") as told:
         scenario_of(text, "old.json")
     assert words in str(told.value)
+
+
+def test_each_vehicle_that_is_flown_is_a_member_and_its_name() -> None:
+    assert [one.value for one in Vehicle] == [one.name for one in flown_vehicles()]
+    assert Vehicle.MAVLINK == "mavlink"
+    assert {"mavlink": 1}[Vehicle.MAVLINK] == 1
+    assert ways_of(Vehicle.BOTH) == ways_of("both")
+
+
+def test_a_scenario_with_a_member_is_that_with_the_name() -> None:
+    def written(vehicle: str) -> Scenario:
+        return Scenario(1, vehicle, "multirotor", 80.0, 0.3, 25.0, 0.0, Failure.MOTOR, 1.0)
+
+    assert written(Vehicle.UPF) == written("upf")
+    assert written(Vehicle.UPF).carries.name == "upf"

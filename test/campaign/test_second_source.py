@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from campaign_bench import SHIPPED, fired, flown, scenario
+from campaign_bench import SHIPPED, correct, fired, flown, left_alone, scenario
 from combinations import combinations
 
 from chute_ros.campaign import draw as drawing
@@ -36,8 +36,7 @@ def test_what_outlives_the_autopilot_shows_the_fall(
     sources: tuple[str, ...], profile: str, vehicle: str
 ) -> None:
     how = {"profile": profile, "vehicle": vehicle, "height": 110.0}
-    end = flown(Failure.POWER, vehicle_sources=sources, **how)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.POWER, vehicle_sources=sources, **how))
     assert end.truth.at < end.killed < end.released < end.truth.latest
 
 
@@ -58,9 +57,7 @@ def test_an_attitude_beside_an_autopilot_that_is_lost_is_enough(profile: str) ->
     combinations([WITH_IMU, WITH_ODOMETRY, IMU_FIRST, WITH_BOTH], [Failure.NOTHING, Failure.HANG]),
 )
 def test_what_flies_on_is_left_alone(failure: Failure, sources: tuple[str, ...]) -> None:
-    end = flown(failure, gusts=1.0, vehicle_sources=sources)
-    assert judge(end).count is Count.CORRECT
-    assert not fired(end)
+    left_alone(flown(failure, gusts=1.0, vehicle_sources=sources))
 
 
 def test_a_motor_that_fails_is_seen_with_a_second_source_that_is_silent() -> None:
@@ -83,8 +80,7 @@ def test_what_kept_the_last_one_that_tells_from_it_is_named(
 ) -> None:
     judged = judge(flown(Failure.POWER, fault, vehicle_sources=WITH_ODOMETRY))
     assert (judged.count, judged.why) == (Count.NOT_TOLD, cause)
-    both = flown(Failure.POWER, fault, vehicle_sources=WITH_BOTH)
-    assert judge(both).count is Count.CORRECT
+    correct(flown(Failure.POWER, fault, vehicle_sources=WITH_BOTH))
 
 
 @pytest.mark.parametrize(
@@ -103,8 +99,7 @@ def test_what_is_wrong_with_an_autopilot_without_power_is_no_excuse(faults: tupl
 def test_a_second_source_that_was_killed_tells_again() -> None:
     """At t+0 the autopilot loses its power; from t-0.5 to t+0.5 there is no odometry."""
     dies = Stop(ODOMETRY, 0.5, 1.0, dies=True)
-    end = flown(Failure.POWER, dies, vehicle_sources=WITH_ODOMETRY, height=110.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.POWER, dies, vehicle_sources=WITH_ODOMETRY, height=110.0))
     assert end.released < end.truth.latest
 
 
@@ -114,8 +109,7 @@ def test_beside_a_roof_the_height_of_another_source_outlives_a_restart(sources) 
     when odometry tells how far, then the parachute is released."""
     again = (Stop("autopilot", 2.0 + 1.5 * k, 0.9, dies=True) for k in range(3))
     how = {"vehicle_sources": sources, "height": 6.0, "ground": -90.0}
-    end = flown(Failure.REBOOT, *again, **how)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.REBOOT, *again, **how))
     assert end.release_height < -9.0
 
 

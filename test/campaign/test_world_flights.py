@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from campaign_bench import fired, flown
+from campaign_bench import correct, flown, left_alone
 from combinations import combinations
 
 from chute_ros.campaign.estimator import EstimatorFault
@@ -25,24 +25,21 @@ GLIDE = Descent("glide", 3.0, settles=1.5, tilt=0.1)
 
 
 def test_what_sinks_upright_and_was_not_told_to_is_released() -> None:
-    end = flown(Failure.SINK, descent=SINKS)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.SINK, descent=SINKS))
     assert end.truth.at + 1.0 < end.released < end.truth.latest
 
 
 def test_a_spin_is_released_and_a_glide_is_not() -> None:
-    spins = flown(Failure.STALL, profile="fixed_wing", descent=FLAT_SPIN, unheld=FLAT_SPIN)
-    assert judge(spins).count is Count.CORRECT
+    spins = correct(
+        flown(Failure.STALL, profile="fixed_wing", descent=FLAT_SPIN, unheld=FLAT_SPIN)
+    )
     assert spins.released < spins.truth.latest
-    glides = flown(Failure.GLIDE, profile="fixed_wing", descent=GLIDE, unheld=DIVE)
-    assert judge(glides).count is Count.CORRECT
-    assert not fired(glides)
+    left_alone(flown(Failure.GLIDE, profile="fixed_wing", descent=GLIDE, unheld=DIVE))
 
 
 @pytest.mark.parametrize("vehicle", ["mavlink", "upf"])
 def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: str) -> None:
-    end = flown(Failure.MOTOR, vehicle=vehicle, height=8.0, ground=-80.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, vehicle=vehicle, height=8.0, ground=-80.0))
     assert end.release_height < -9.0
     assert end.landing_speed <= 6.5 or math.isnan(end.landed)
 
@@ -54,8 +51,7 @@ def test_what_a_person_alone_kills_is_not_released_by_any_autopilot(
     kind: str, profile: str
 ) -> None:
     person, autopilot = Person("kill_only", 1.0), Autopilot(kind=kind)
-    end = flown(Failure.NOTHING, person=person, autopilot=autopilot, profile=profile)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.NOTHING, person=person, autopilot=autopilot, profile=profile))
     assert end.killed < end.up + 1.3
     assert math.isnan(end.released)
     assert not math.isnan(end.landed)
@@ -63,27 +59,22 @@ def test_what_a_person_alone_kills_is_not_released_by_any_autopilot(
 
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_on_every_autopilot_the_kill_is_before_the_release_and_soon(kind: str) -> None:
-    end = flown(Failure.MOTOR, autopilot=Autopilot(kind=kind))
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, autopilot=Autopilot(kind=kind)))
     assert end.killed < end.released < end.truth.at + 1.0
 
 
 @pytest.mark.parametrize("homing", list(Homing))
 def test_what_a_person_kills_is_released_whatever_becomes_of_home(homing: Homing) -> None:
     autopilot = Autopilot(homing)
-    end = flown(Failure.NOTHING, person=Person("kill", 1.0), autopilot=autopilot)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.NOTHING, person=Person("kill", 1.0), autopilot=autopilot))
     assert end.released < end.up + 2.0
 
 
 @pytest.mark.parametrize("by", [-40.0, 55.0])
 def test_a_home_that_is_set_anew_hides_no_fall_and_is_none(by: float) -> None:
-    falls = flown(Failure.MOTOR, HomeMove(0.9, by))
-    assert judge(falls).count is Count.CORRECT
+    falls = correct(flown(Failure.MOTOR, HomeMove(0.9, by)))
     assert falls.released < falls.truth.latest
-    flies = flown(Failure.NOTHING, HomeMove(0.9, by))
-    assert judge(flies).count is Count.CORRECT
-    assert not fired(flies)
+    left_alone(flown(Failure.NOTHING, HomeMove(0.9, by)))
 
 
 @pytest.mark.parametrize(
@@ -98,9 +89,7 @@ def test_a_home_that_is_set_anew_hides_no_fall_and_is_none(by: float) -> None:
 )
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 def test_what_is_flown_on_purpose_is_left_alone(manoeuvre: Manoeuvre, profile: str) -> None:
-    end = flown(Failure.NOTHING, manoeuvre=manoeuvre, profile=profile, height=80.0)
-    assert judge(end).count is Count.CORRECT
-    assert not fired(end)
+    left_alone(flown(Failure.NOTHING, manoeuvre=manoeuvre, profile=profile, height=80.0))
 
 
 @pytest.mark.parametrize(
@@ -108,9 +97,7 @@ def test_what_is_flown_on_purpose_is_left_alone(manoeuvre: Manoeuvre, profile: s
 )
 def test_a_descent_with_one_sensor_wrong_is_left_alone(sensor: str, how: str) -> None:
     wrong = SensorFault(sensor, how, 2.0, 5.0)
-    end = flown(Failure.NOTHING, wrong, manoeuvre=Manoeuvre("descent", 4.0, 1.0, 6.0))
-    assert judge(end).count is Count.CORRECT
-    assert not fired(end)
+    left_alone(flown(Failure.NOTHING, wrong, manoeuvre=Manoeuvre("descent", 4.0, 1.0, 6.0)))
 
 
 @pytest.mark.parametrize(
@@ -119,14 +106,11 @@ def test_a_descent_with_one_sensor_wrong_is_left_alone(sensor: str, how: str) ->
     ids=lambda one: one.how,
 )
 def test_an_estimator_that_is_wrong_with_itself_ends_no_flight(fault: EstimatorFault) -> None:
-    end = flown(Failure.NOTHING, fault)
-    assert judge(end).count is Count.CORRECT
-    assert not fired(end)
+    left_alone(flown(Failure.NOTHING, fault))
 
 
 def test_nor_does_it_hide_a_tumble() -> None:
-    end = flown(Failure.MOTOR, EstimatorFault("hovers", 0.8, 12.0), height=80.0)
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, EstimatorFault("hovers", 0.8, 12.0), height=80.0))
     assert end.released < end.truth.latest
 
 
@@ -137,8 +121,7 @@ def test_a_canopy_that_does_not_carry_is_followed_by_the_next_parachute() -> Non
 
 
 def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
-    end = flown(Failure.MOTOR, height=120.0, canopy=Canopy(22.0))
-    assert judge(end).count is Count.CORRECT
+    end = correct(flown(Failure.MOTOR, height=120.0, canopy=Canopy(22.0)))
     assert end.landing_speed > 15.0
     assert [text for at, text in end.alarmed if at > end.another.at]
 
