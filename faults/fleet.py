@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 from chute_ros.links.registered import module_of
@@ -66,6 +65,16 @@ def until(what: str, seconds: float, condition: Callable[[], bool]) -> None:
         if time.monotonic() >= end:
             raise StepFailedError(f"{what}: not within {seconds:g} s")
         time.sleep(_POLL)
+
+
+def until_told(
+    station: GroundStationLink, what: str, seconds: float, since: float = 0.0, **wanted: object
+) -> Told:
+    """The first that the station tells with these fields since then, awaited as by until."""
+    until(what, seconds, lambda: station.first(since, **wanted) is not None)
+    first = station.first(since, **wanted)
+    assert first is not None
+    return first
 
 
 class Fleet:
@@ -220,22 +229,23 @@ class Fleet:
                     self.act(number, "arm")
                     self.act(number, f"takeoff={HEIGHT}")
             asked_at = time.monotonic()
-            until("states come", 10.0, partial(_told_since, station, asked_at + 2.0))
+            until_told(station, "states come", 10.0, asked_at + 2.0, vehicle=..., state=...)
             seen = newest_states(station.find(vehicle=..., state=...))
             missing = tuple(n for n in missing if seen.get(name_of(n)) != Stage.IN_FLIGHT)
 
     def answer(self, station: GroundStationLink, token: int) -> Told:
         """The answer to a call, awaited."""
-        until("a call is answered", 15.0, lambda: station.first(answered=token) is not None)
-        answer = station.first(answered=token)
-        assert answer is not None
-        return answer
+        return until_told(station, "a call is answered", 15.0, answered=token)
+
+    def join(self) -> float:
+        """Another ground station starts: how long until it has seen all, s."""
+        joined = self.station()
+        seen = self.until_all(joined, "all are seen", 60.0, None)
+        begun = until_told(joined, "it looks around", 1.0, begun=True)
+        self.close_station(joined)
+        return float(seen - begun["at"])
 
 
 def newest_states(told: Iterable[Told]) -> dict[str, int]:
     """Of what a ground station has told in its order: vehicle -> state."""
     return {one["vehicle"]: one["state"] for one in told}
-
-
-def _told_since(station: GroundStationLink, when: float) -> bool:
-    return station.first(when, vehicle=..., state=...) is not None

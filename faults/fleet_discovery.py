@@ -13,7 +13,7 @@ from pathlib import Path
 from chute_ros.errors import ChuteError
 from chute_ros.tools import pages
 from faults.discovery_server import DiscoveryServers
-from faults.fleet import Fleet, host_of, hosts_for, name_of, until
+from faults.fleet import Fleet, host_of, hosts_for, name_of, until_told
 from faults.ground_station_link import GroundStationLink
 from faults.network import Network
 
@@ -52,7 +52,8 @@ class Search:
     def run(self) -> None:
         """Who finds whom, also while the server on the ground is dead, and afterwards."""
         self._fleet.start(self._station)
-        self._joins()
+        name = "a ground station with `ROS_DISCOVERY_SERVER` starts"
+        self.steps.append(Step(name, self._fleet.join(), "all vehicles"))
         self._stranger("a ground station without it starts (multicast does not pass)", {})
         self._list_topics("a tool", {})
         self._list_topics("a tool with `ROS_SUPER_CLIENT=TRUE`", _SUPER)
@@ -88,29 +89,14 @@ class Search:
         time.sleep(max(0.0, cut_at + FORGOTTEN - time.monotonic()))
         self._network.cable(host, "unicast")
         healed_at = time.monotonic()
-        seen = self._when("it is seen", healed_at, vehicle=name_of(1), state=...)
-        self.steps.append(
-            Step("that cable is healed: the ground station sees it", seen, "the vehicle")
-        )
-
-    def _when(self, what: str, since: float, **told: object) -> float:
-        until(what, 60.0, lambda: self._station.first(since, **told) is not None)
-        first = self._station.first(since, **told)
-        assert first is not None
-        return float(first["at"]) - since
-
-    def _joins(self) -> None:
-        joined = self._fleet.station()
-        seen = self._fleet.until_all(joined, "all are seen", 30.0, None)
-        begun = joined.first(begun=True)
-        assert begun is not None
-        name = "a ground station with `ROS_DISCOVERY_SERVER` starts"
-        self.steps.append(Step(name, seen - begun["at"], "all vehicles"))
-        self._fleet.close_station(joined)
+        what = {"vehicle": name_of(1), "state": ...}
+        seen = until_told(self._station, "it is seen", 60.0, healed_at, **what)["at"]
+        name = "that cable is healed: the ground station sees it"
+        self.steps.append(Step(name, seen - healed_at, "the vehicle"))
 
     def _stranger(self, name: str, environment: Mapping[str, str]) -> GroundStationLink:
         stranger = self._fleet.station(environment)
-        until("it looks around", 20.0, lambda: stranger.first(begun=True) is not None)
+        until_told(stranger, "it looks around", 20.0, begun=True)
         time.sleep(LOOKED)
         found = {one["vehicle"] for one in stranger.find(vehicle=...)}
         text = f"nothing in {LOOKED:g} s" if not found else ", ".join(sorted(found))
@@ -121,9 +107,7 @@ class Search:
         tool = self._fleet.station({**self._servers.of_ground, **more})
         self._fleet.until_all(tool, "all are seen", 30.0, None)
         tool.ask_topics()
-        until("the tool's topics", 10.0, lambda: tool.first(topics=...) is not None)
-        told = tool.first(topics=...)
-        assert told is not None
+        told = until_told(tool, "the tool's topics", 10.0, topics=...)
         # A ground station has no business with it, so that nobody but a super client is told.
         heartbeats = [name_of(n) + "/safety/heartbeat" for n in self._fleet.numbers]
         found = sum(one in told["topics"] for one in heartbeats)

@@ -13,7 +13,16 @@ from chute_ros.errors import ChuteError
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import pages
 from faults.discovery_server import DiscoveryServers
-from faults.fleet import GROUND, HEIGHT, Fleet, hosts_for, name_of, newest_states, until
+from faults.fleet import (
+    GROUND,
+    HEIGHT,
+    Fleet,
+    hosts_for,
+    name_of,
+    newest_states,
+    until,
+    until_told,
+)
 from faults.fleet_load import Usage, busy, usage
 from faults.ground_station_link import GroundStationLink, Told
 from faults.network import Network
@@ -114,12 +123,7 @@ def _fly(fleet: Fleet, flown: Flown) -> None:
     fleet.start(station)
     fleet.take_off(station)
     time.sleep(HEIGHT / 6.0)  # they climb 6 m/s
-    joined = fleet.station()
-    seen = fleet.until_all(joined, "all are seen", 60.0, None)
-    begun = joined.first(begun=True)
-    assert begun is not None
-    flown.all_seen = seen - begun["at"]
-    fleet.close_station(joined)
+    flown.all_seen = fleet.join()
     _measure(fleet, station, flown)
     with busy(SPINNERS if flown.size.busy else 0):
         if flown.size.busy:
@@ -201,9 +205,7 @@ def _count_late(station: GroundStationLink, flown: Flown) -> None:
     """What the supervisors say of themselves."""
     asked_at = time.monotonic()
     station.ask_diagnostics()
-    until("its diagnostics", 10.0, lambda: station.first(asked_at, diagnostics=...) is not None)
-    told = station.first(asked_at, diagnostics=...)
-    assert told is not None
+    told = until_told(station, "its diagnostics", 10.0, asked_at, diagnostics=...)
     for name, status in told["diagnostics"].items():
         if name.endswith(": itself"):
             flown.late += int(status["values"]["updates late"])

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.process_cost import resident_memory
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
 from chute_ros.tools.processes import Processes
 
@@ -47,13 +48,10 @@ class RespawnedProcesses(Processes):
 
     def memory(self, name: str) -> float:
         """What it has now, MB; NaN: it has ended."""
-        path = Path("/proc") / str(self.pid(name)) / "status"
         try:
-            lines = path.read_text().splitlines()
+            return resident_memory(self.pid(name)) or float("nan")
         except OSError:
             return float("nan")
-        found = [int(line.split()[1]) for line in lines if line.startswith("VmRSS:")]
-        return found[0] / 1024 if found else float("nan")
 
     def check(self) -> None:
         """Start those again that have ended; what they had is remembered."""

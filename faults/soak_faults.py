@@ -13,6 +13,8 @@ from faults.soak_relay import INVALID, VALID
 from faults.soak_vehicle import Vehicle
 from faults.soak_wires import INTERFACE, VEHICLE
 
+#: Takes a fault away.
+Undo = Callable[[], None]
 _LOSS = 0.3
 _BLOCK = bytes(65536)
 
@@ -22,62 +24,59 @@ class Fault:
 
     def __init__(self, vehicle: Vehicle, plan: Plan) -> None:
         self._vehicle, self._plan = vehicle, plan
-        self._undo: Callable[[], None] = lambda: None
+        self._undo: Undo = _nothing
 
     def begin(self) -> None:
         """Now."""
-        begin = {
+        begin: Callable[[], Undo] = {
             "kill -9": self._kill,
             "SIGSTOP": self._stop,
             "serial port vanishes": self._pull_out,
             "UDP port closed": self._close_ports,
             "interface down": self._interface_down,
             "cable cut": self._cut,
-            "30 % lost both ways": self._lose,
-            "flood of valid frames": lambda: self._flood(VALID),
-            "flood of invalid frames": lambda: self._flood(INVALID),
+            "30 % lost both ways": lambda: self._spoil("loss", _LOSS, 0.0),
+            "flood of valid frames": lambda: self._spoil("flood", VALID, ""),
+            "flood of invalid frames": lambda: self._spoil("flood", INVALID, ""),
             "disk full": self._fill_disk,
             "no descriptors left": self._exhaust,
             "wall clock set": self._set_clock,
         }[self._plan.kind]
-        begin()
+        self._undo = begin()
 
     def end(self) -> None:
         """It is over."""
         self._undo()
 
-    def _kill(self) -> None:
+    def _kill(self) -> Undo:
         self._vehicle.watch.expect(self._plan.target)
         self._vehicle.keeper.kill(self._plan.target)
+        return _nothing
 
-    def _stop(self) -> None:
+    def _stop(self) -> Undo:
         keeper, target = self._vehicle.keeper, self._plan.target
         keeper.signal(target, signal.SIGSTOP)
-        self._undo = lambda: keeper.signal(target, signal.SIGCONT)
+        return lambda: keeper.signal(target, signal.SIGCONT)
 
-    def _pull_out(self) -> None:
-        wires = self._vehicle.wires
-        with wires.lock:
-            wires.serial.pull_out()
+    def _pull_out(self) -> Undo:
+        serial = self._vehicle.wires.serial
+        return self._locked(serial.pull_out, serial.plug_in)
 
-        def plug_in() -> None:
-            with wires.lock:
-                wires.serial.plug_in()
+    def _close_ports(self) -> Undo:
+        mavlink = self._vehicle.wires.mavlink
+        return self._locked(mavlink.close_ports, mavlink.open_ports)
 
-        self._undo = plug_in
+    def _locked(self, do: Callable[[], None], undo: Callable[[], None]) -> Undo:
+        """Each while nobody reads the wires."""
 
-    def _close_ports(self) -> None:
-        wires = self._vehicle.wires
-        with wires.lock:
-            wires.mavlink.close_ports()
+        def held(function: Callable[[], None]) -> None:
+            with self._vehicle.wires.lock:
+                function()
 
-        def open_ports() -> None:
-            with wires.lock:
-                wires.mavlink.open_ports()
+        held(do)
+        return lambda: held(undo)
 
-        self._undo = open_ports
-
-    def _interface_down(self) -> None:
+    def _interface_down(self) -> Undo:
         name = self._plan.target
         _ip("link", "set", name, "down")
 
@@ -87,52 +86,40 @@ class Fault:
                 # With the interface the kernel forgot it.
                 _ip("route", "replace", "224.0.0.0/4", "dev", name)
 
-        self._undo = up
+        return up
 
-    def _cut(self) -> None:
-        if self._plan.target == "mavlink":
-            network = self._vehicle.network
-            network.cable(VEHICLE, "cut")
-            self._undo = lambda: network.cable(VEHICLE, "heal")
-            return
-        relay = self._vehicle.wires.can
-        relay.cut = True
-        self._undo = lambda: setattr(relay, "cut", False)
+    def _cut(self) -> Undo:
+        if self._plan.target != "mavlink":
+            return self._spoil("cut", True, False)
+        network = self._vehicle.network
+        network.cable(VEHICLE, "cut")
+        return lambda: network.cable(VEHICLE, "heal")
 
-    def _lose(self) -> None:
+    def _spoil(self, what: str, value: object, whole: object) -> Undo:
+        """Of the relays that it strikes."""
         relays = self._vehicle.wires.chosen(self._plan.target)
 
-        def lose(share: float) -> None:
+        def set_to(one: object) -> None:
             for relay in relays:
-                relay.loss = share
+                setattr(relay, what, one)
 
-        lose(_LOSS)
-        self._undo = lambda: lose(0.0)
+        set_to(value)
+        return lambda: set_to(whole)
 
-    def _flood(self, what: str) -> None:
-        relays = self._vehicle.wires.chosen(self._plan.target)
-
-        def flood(kind: str) -> None:
-            for relay in relays:
-                relay.flood = kind
-
-        flood(what)
-        self._undo = lambda: flood("")
-
-    def _fill_disk(self) -> None:
+    def _fill_disk(self) -> Undo:
         path = self._vehicle.home / "full"
         fill(path)
-        self._undo = path.unlink
+        return path.unlink
 
-    def _exhaust(self) -> None:
+    def _exhaust(self) -> Undo:
         keeper, plan = self._vehicle.keeper, self._plan
         keeper.exhaust_descriptors(plan.target)
         if plan.beside:
             self._vehicle.watch.expect(plan.beside)
             keeper.kill(plan.beside)
-        self._undo = lambda: keeper.restore_descriptors(plan.target)
+        return lambda: keeper.restore_descriptors(plan.target)
 
-    def _set_clock(self) -> None:
+    def _set_clock(self) -> Undo:
         clocks, target = self._vehicle.clocks, self._plan.target
         some = list(clocks.values()) if target == "all nodes" else [clocks[target]]
 
@@ -141,7 +128,11 @@ class Fault:
                 clock.set_by(seconds)
 
         set_by(self._plan.step)
-        self._undo = lambda: set_by(0.0)
+        return lambda: set_by(0.0)
+
+
+def _nothing() -> None:
+    """What was killed is started again without us."""
 
 
 def fill(path: Path) -> None:

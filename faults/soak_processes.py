@@ -52,6 +52,11 @@ class Child:
     #: The unfinished last line of what was read.
     rest: str = ""
 
+    def live_again(self, process: subprocess.Popen[bytes]) -> None:
+        """In another process."""
+        self.process, self.ended_by_us, self.start_at = process, False, float("nan")
+        self.life += 1
+
 
 @dataclass
 class Keeper:
@@ -77,9 +82,8 @@ class Keeper:
         if known is None:
             self.children[name] = Child(name, command, environment, log, process)
             return
-        known.command, known.environment, known.process = command, environment, process
-        known.ended_by_us, known.start_at = False, float("nan")
-        known.life += 1
+        known.command, known.environment = command, environment
+        known.live_again(process)
 
     def look(self) -> list[tuple[str, str]]:
         """Start again what has ended long enough ago; the new lines of all: (name, line)."""
@@ -94,9 +98,7 @@ class Keeper:
                     self.findings.append(f"{child.name} ended by itself with code {code}")
                     self.last_words.append(_last_words(child))
             elif now >= child.start_at:
-                child.process = _spawn(child.command, child.environment, child.log)
-                child.ended_by_us, child.start_at = False, float("nan")
-                child.life += 1
+                child.live_again(_spawn(child.command, child.environment, child.log))
         return [(child.name, line) for child in self.children.values() for line in _new(child)]
 
     def note_troubles(self, lines: list[tuple[str, str]]) -> None:
