@@ -15,20 +15,24 @@ from safety_case.check import KINDS, MODES, problems
 from safety_case.documents import FOLDER, ROOT
 from safety_case.parts import ACTIONS, PARTS, carried_by, without_section
 
-SHOWN = "- ``test/test_deploy.py::test_it_opens``"
+SHOWS = "test/test_deploy.py"
+SHOWN = f"- ``{SHOWS}::test_it_opens``"
 
 
 def requirement(uid="R-1", **other):
-    files = ["chute_ros/deploy.py", "test/test_deploy.py"]
-    relations = [{"TYPE": "File", "VALUE": one} for one in files]
+    files = ["chute_ros/deploy.py", SHOWS]
     node = {"_NODE_TYPE": "REQUIREMENT", "UID": uid, "SECTION": "deploy", "PAGES": "deploy.md"}
-    return {**node, "CAMPAIGN": "MOTOR", "RELATIONS": relations, **other}
+    return {**node, "CAMPAIGN": "MOTOR", "RELATIONS": relations(*files), **other}
+
+
+def relations(*files):
+    return [{"TYPE": "File", "VALUE": one} for one in files]
 
 
 def row(kind, section, title, **other):
     node = {"_NODE_TYPE": kind, "SECTION": section, "TITLE": title, "UID": f"{section} {title}"}
-    relations = [{"TYPE": "Parent", "VALUE": "R-1"}]
-    return {**node, "RELATIONS": relations, "SHOWN_BY": SHOWN, **other}
+    parent = {"TYPE": "Parent", "VALUE": "R-1"}
+    return {**node, "RELATIONS": [parent], "SHOWN_BY": SHOWN, **other}
 
 
 def failures():
@@ -41,6 +45,10 @@ def failures():
 
 def actions():
     return [row("UNSAFE_ACTION", action, kind) for action in ACTIONS for kind in KINDS]
+
+
+def all_rows():
+    return [*failures(), *actions()]
 
 
 @pytest.fixture
@@ -57,34 +65,27 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_a_whole_case_has_no_problem(root):
-    assert problems([requirement(), *failures(), *actions()], root) == []
+    assert problems([requirement(), *all_rows()], root) == []
 
 
-def test_a_requirement_without_a_test_is_an_orphan(root):
-    relations = [{"TYPE": "File", "VALUE": "chute_ros/deploy.py"}]
-    orphan = requirement("R-2", RELATIONS=relations)
-    told = problems([requirement(), orphan, *failures(), *actions()], root)
-    assert told == ["R-2 is an orphan: no test shows it; name one in its RELATIONS"]
-
-
-def test_a_requirement_without_code_is_an_orphan(root):
-    relations = [{"TYPE": "File", "VALUE": "test/test_deploy.py"}]
-    orphan = requirement("R-2", RELATIONS=relations)
-    (told,) = problems([requirement(), orphan, *failures(), *actions()], root)
-    assert told.startswith("R-2 is an orphan: no code fulfils it")
-
-
-def test_a_test_that_shows_no_requirement_is_an_orphan(root):
-    (root / "test" / "tools").mkdir()
-    (root / "test" / "tools" / "test_orphan.py").write_text("")
-    (told,) = problems([requirement(), *failures(), *actions()], root)
-    assert told.startswith("test/tools/test_orphan.py is an orphan: it shows no requirement")
+@pytest.mark.parametrize(
+    ("file", "lacks"),
+    [
+        ("chute_ros/deploy.py", "no test shows it; name one in its RELATIONS"),
+        (SHOWS, "no code fulfils it; name a file in its RELATIONS"),
+    ],
+)
+def test_a_requirement_without_a_test_or_without_code_is_an_orphan(root, file, lacks):
+    orphan = requirement("R-2", RELATIONS=relations(file))
+    told = problems([requirement(), orphan, *all_rows()], root)
+    assert told == [f"R-2 is an orphan: {lacks}"]
 
 
 @pytest.mark.parametrize(
     ("name", "told"),
     [
         ("msg_defs/test/test_new.py", "it shows no requirement"),
+        ("test/tools/test_new.py", "it shows no requirement"),
         ("chute_ros/supervisor/conditions/new.py", "no requirement names it"),
         ("chute_ros/runtime/new.py", "no requirement names it"),
         ("chute_ros/links/new/__init__.py", "no requirement names it"),
@@ -95,7 +96,7 @@ def test_what_no_requirement_names_is_an_orphan(root, name, told):
     path = root / name
     path.parent.mkdir(parents=True)
     path.write_text('"""A docstring."""\n\nLINK = None\n')
-    (found,) = problems([requirement(), *failures(), *actions()], root)
+    (found,) = problems([requirement(), *all_rows()], root)
     assert found.startswith(f"{name} is an orphan: {told}")
 
 
@@ -105,48 +106,58 @@ def test_a_folder_names_the_modules_in_it_and_none_below(root):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text('"""A docstring."""\n')
     named = requirement(FOLDERS="chute_ros/links/new, chute_ros/links/gone")
-    gone, below = problems([named, *failures(), *actions()], root)
+    gone, below = problems([named, *all_rows()], root)
     assert gone == "R-1: there is no folder chute_ros/links/gone"
     assert below.startswith("chute_ros/links/new/protocol/wire.py is an orphan")
-
-
-def test_a_file_that_is_not_there_is_told(root):
-    relations = [*requirement()["RELATIONS"], {"TYPE": "File", "VALUE": "chute_ros/gone.py"}]
-    told = problems([requirement(RELATIONS=relations), *failures(), *actions()], root)
-    assert told == ["R-1: there is no chute_ros/gone.py"]
 
 
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
+        (
+            {"RELATIONS": relations("chute_ros/gone.py", "chute_ros/deploy.py", SHOWS)},
+            "R-1: there is no chute_ros/gone.py",
+        ),
         ({"PAGES": "deploy.md, none.md"}, "R-1: there is no page docs/none.md"),
         ({"CAMPAIGN": "MOTOR, Stop, DOUBLED, WINGS"}, "R-1: the campaign has no row WINGS"),
     ],
 )
-def test_a_page_or_a_row_of_the_campaign_that_is_not_there_is_told(root, changed, told):
-    assert problems([requirement(**changed), *failures(), *actions()], root) == [told]
+def test_what_a_requirement_names_and_is_not_there_is_told(root, changed, told):
+    assert problems([requirement(**changed), *all_rows()], root) == [told]
 
 
 @pytest.mark.parametrize(("said", "enough"), [("", 0), ("none: ", 0), ("none: it is text", 1)])
 def test_a_requirement_names_a_row_of_the_campaign_or_says_why_not(root, said, enough):
-    told = problems([requirement(CAMPAIGN=said), *failures(), *actions()], root)
+    told = problems([requirement(CAMPAIGN=said), *all_rows()], root)
     assert len(told) == 1 - enough
     assert all("says 'none: why'" in one for one in told)
 
 
+LIST = "SHOWN_BY is a list of ``path`` or ``path::test``"
+STAYS = "STAYS says why a single failure stays"
+TOLD = "TOLD says who learns of what stays: NOBODY; FLIGHT; GROUND; GROUND, FLIGHT"
+MISSED = {"SINGLE": "MISSED", "STAYS": "One wire."}
+
+
 @pytest.mark.parametrize(
-    ("shown", "told"),
+    ("changed", "told"),
     [
-        ("- ``test/test_gone.py::test_it``", "there is no test/test_gone.py"),
-        ("- ``test/test_deploy.py::test_it``", "test/test_deploy.py has no test_it"),
-        ("- test/test_deploy.py", "SHOWN_BY is a list of ``path`` or ``path::test``"),
-        ("", "SHOWN_BY is a list of ``path`` or ``path::test``"),
+        ({"SHOWN_BY": "- ``test/test_gone.py::test_it``"}, "there is no test/test_gone.py"),
+        ({"SHOWN_BY": f"- ``{SHOWS}::test_it``"}, f"{SHOWS} has no test_it"),
+        ({"SHOWN_BY": f"- {SHOWS}"}, LIST),
+        ({"SHOWN_BY": ""}, LIST),
+        ({"RELATIONS": []}, "no requirement answers it"),
+        ({"SINGLE": "MISSED", "STAYS": "", "TOLD": ""}, STAYS),
+        ({"SINGLE": "NONE", "STAYS": "it is rare", "TOLD": "NOBODY"}, STAYS),
+        (MISSED, TOLD),
+        ({**MISSED, "TOLD": "FLIGHT, NOBODY"}, TOLD),
+        ({**MISSED, "TOLD": "FLIGHT, GROUND"}, TOLD),
     ],
 )
-def test_a_row_that_names_no_test_that_exists_is_told(root, shown, told):
-    rows = [*failures(), *actions()]
-    rows[0] = {**rows[0], "SHOWN_BY": shown}
-    assert problems([requirement(), *rows], root) == [f"{rows[0]['UID']}: {told}"]
+def test_what_is_wrong_with_a_row_is_told(root, changed, told):
+    first, *others = all_rows()
+    (found,) = problems([requirement(), {**first, **changed}, *others], root)
+    assert found.startswith(f"{first['UID']}: {told}")
 
 
 def test_a_part_without_one_of_its_failures_is_told(root):
@@ -168,7 +179,7 @@ def test_a_failure_that_is_none_of_the_six_is_told(root):
 
 @pytest.mark.parametrize("section", ["a hot standby", "Disarm the parachute"])
 def test_a_part_or_an_action_that_is_left_out_whole_is_told(root, section):
-    rows = [one for one in [*failures(), *actions()] if one["SECTION"] != section]
+    rows = [one for one in all_rows() if one["SECTION"] != section]
     told = problems([requirement(), *rows], root)
     assert len(told) in (len(MODES), len(KINDS))
     assert all(one.startswith(f"{section}: 0 rows for the ") for one in told)
@@ -193,29 +204,6 @@ def test_a_section_that_stands_for_nothing_is_told(root):
 def test_what_the_code_has_needs_a_section(monkeypatch, table, section, told):
     monkeypatch.delitem(table, section)
     assert [one.split(" has no ")[0] for one in without_section()] == told
-
-
-@pytest.mark.parametrize(("single", "stays"), [("MISSED", ""), ("NONE", "it is rare")])
-def test_a_single_failure_stays_with_its_reason_or_is_cured(root, single, stays):
-    rows = failures()
-    rows[0] = {**rows[0], "SINGLE": single, "STAYS": stays, "TOLD": stays and "NOBODY"}
-    (told,) = problems([requirement(), *rows, *actions()], root)
-    assert "STAYS says why a single failure stays" in told
-
-
-@pytest.mark.parametrize("told_to", [{}, {"TOLD": "FLIGHT, NOBODY"}, {"TOLD": "FLIGHT, GROUND"}])
-def test_of_what_stays_it_is_said_who_is_told(root, told_to):
-    rows = failures()
-    rows[0] = {**rows[0], "SINGLE": "MISSED", "STAYS": "One wire.", **told_to}
-    (told,) = problems([requirement(), *rows, *actions()], root)
-    assert "TOLD says who learns of what stays: NOBODY; FLIGHT; GROUND; GROUND, FLIGHT" in told
-
-
-def test_a_row_that_no_requirement_answers_is_told(root):
-    rows = [*failures(), *actions()]
-    rows[-1] = {**rows[-1], "RELATIONS": []}
-    (told,) = problems([requirement(), *rows], root)
-    assert told.startswith(f"{rows[-1]['UID']}: no requirement answers it")
 
 
 def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL
 REQUEST = dialect.MAV_CMD_REQUEST_MESSAGE
 STATUS = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
+HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
 INFORMATION = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
 INTERVAL = dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL
 
@@ -48,9 +49,14 @@ def test_an_interval_is_set_read_back_switched_off_and_set_to_its_default():
     assert station.newest("MESSAGE_INTERVAL").interval_us == 1_000_000
 
 
-@pytest.mark.parametrize("command", [(SET, 30, 100_000), (SET, STATUS, -2), (GET, 30)])
-def test_an_interval_that_cannot_be_is_denied(command):
-    assert module().command(*command) == [DENIED]
+@pytest.mark.parametrize(
+    "command",
+    [(SET, 30, 100_000), (SET, STATUS, -2), (GET, 30), (REQUEST, 30), (SET, HEARTBEAT, -1)],
+)
+def test_what_it_does_not_have_and_an_interval_that_cannot_be_are_denied(command):
+    station = module()
+    assert station.command(*command) == [DENIED]
+    assert count(station, "HEARTBEAT", 3.0) == 3, "which cannot be switched off"
 
 
 def test_a_flood_cannot_be_asked_for():
@@ -61,17 +67,17 @@ def test_a_flood_cannot_be_asked_for():
 
 @pytest.mark.parametrize(
     ("message_id", "name"),
-    [(0, "HEARTBEAT"), (STATUS, "PARACHUTE_STATUS"), (INFORMATION, "COMPONENT_INFORMATION_BASIC")],
+    [
+        (HEARTBEAT, "HEARTBEAT"),
+        (STATUS, "PARACHUTE_STATUS"),
+        (INFORMATION, "COMPONENT_INFORMATION_BASIC"),
+    ],
 )
 def test_a_message_is_sent_on_request_after_its_acknowledgement(message_id, name):
     station = module()
     station.forget()
     assert station.command(REQUEST, message_id) == [ACCEPTED]
     assert [f.message.get_type() for f in station.frames] == ["COMMAND_ACK", name]
-
-
-def test_a_message_that_it_does_not_have_is_denied():
-    assert module().command(REQUEST, 30) == [DENIED]
 
 
 def test_the_component_information_names_it():
@@ -101,16 +107,6 @@ def test_it_leaves_to_others_what_is_addressed_to_them(to):
     assert station.messages("COMMAND_ACK") == []
 
 
-def test_its_heartbeat_cannot_be_switched_off():
-    station = module()
-    assert station.command(SET, dialect.MAVLINK_MSG_ID_HEARTBEAT, -1) == [
-        dialect.MAV_RESULT_DENIED
-    ]
-    station.forget()
-    station.run(3.0)
-    assert len(station.messages("HEARTBEAT")) == 3
-
-
 def test_the_acknowledgement_names_who_asked():
     station = module()
     message = dialect.MAVLink_command_long_message(1, 161, REQUEST, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -119,35 +115,33 @@ def test_the_acknowledgement_names_who_asked():
     assert (ack.target_system, ack.target_component) == (255, 190)
 
 
-def test_the_other_form_of_a_command_is_refused_as_such():
+@pytest.mark.parametrize(
+    ("command", "result"),
+    [(REQUEST, dialect.MAV_RESULT_COMMAND_LONG_ONLY), (30001, dialect.MAV_RESULT_UNSUPPORTED)],
+)
+def test_the_other_form_of_a_command_that_it_knows_is_refused_as_such(command, result):
     station = module()
-    message = dialect.MAVLink_command_int_message(1, 161, 0, REQUEST, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    station.send(message)
-    assert station.newest("COMMAND_ACK").result == dialect.MAV_RESULT_COMMAND_LONG_ONLY
+    station.send(dialect.MAVLink_command_int_message(1, 161, 0, command, *[0] * 9))
+    assert station.newest("COMMAND_ACK").result == result
 
 
-def test_a_command_that_it_does_not_know_is_so_in_both_forms():
-    station = module()
-    message = dialect.MAVLink_command_int_message(1, 161, 0, 30001, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    station.send(message)
-    assert station.newest("COMMAND_ACK").result == dialect.MAV_RESULT_UNSUPPORTED
+def asking():
+    """A frame that asks for its status."""
+    ask = dialect.MAVLink_command_long_message(1, 161, REQUEST, 0, STATUS, 0, 0, 0, 0, 0, 0)
+    return FrameEncoder(1, 191).encode(ask, 0.0)
 
 
 @pytest.mark.parametrize("stream", [None, "a stream"])
 def test_garbage_between_frames_does_not_confuse_it(stream):
     station = module()
-    ask = dialect.MAVLink_command_long_message(1, 161, REQUEST, 0, STATUS, 0, 0, 0, 0, 0, 0)
-    frame = FrameEncoder(1, 191).encode(ask, 0.0)
     station.forget()
-    station.device.receive(b"garbage" + frame + b"more", station.now, stream)
+    station.device.receive(b"garbage" + asking() + b"more", station.now, stream)
     station.run(0.0)
     assert len(station.messages("COMMAND_ACK")) == 1
 
 
 def test_what_a_closed_connection_left_unfinished_is_forgotten():
-    station = module()
-    ask = dialect.MAVLink_command_long_message(1, 161, REQUEST, 0, STATUS, 0, 0, 0, 0, 0, 0)
-    frame = FrameEncoder(1, 191).encode(ask, 0.0)
+    station, frame = module(), asking()
     for ended in ("a stream", None):
         station.forget()
         station.device.receive(frame[:20], station.now, "a stream")

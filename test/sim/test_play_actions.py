@@ -57,14 +57,6 @@ def test_one_that_is_disarmed_before_it_leaves_stays_where_it_is():
     assert "NO TAKE-OFF: it was disarmed" in station.log
 
 
-def test_it_lands_and_disarms():
-    station = hovering()
-    station.device.act("land")
-    station.run(15.0)
-    assert station.newest("EXTENDED_SYS_STATE").landed_state == 1
-    assert not station.newest("HEARTBEAT").base_mode
-
-
 def test_what_is_broken_flies_only_after_it_was_mended():
     station = hovering()
     station.device.act("fail-motor")
