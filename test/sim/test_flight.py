@@ -15,12 +15,12 @@ STEP = 0.02
 
 
 def fly(model, seconds):
-    """The heights on the way."""
-    heights = []
+    """The heights and the vertical speeds on the way."""
+    way = []
     for _ in range(round(seconds / STEP)):
         model.step(STEP)
-        heights.append(model.height)
-    return heights
+        way.append((model.height, model.vertical_speed))
+    return zip(*way, strict=True)
 
 
 def hovering(height):
@@ -39,32 +39,17 @@ def test_it_stands_until_it_is_armed_and_told_to_climb():
     assert model.on_ground
 
 
-def test_it_climbs_to_its_target_and_hovers_there():
+def test_it_climbs_to_its_target_hovers_there_and_lands_softly_when_told_to():
     model = FlightModel(armed=True, target_height=60.0)
-    heights = fly(model, 40.0)
+    heights, speeds = fly(model, 40.0)
     assert max(heights) < 60.5, "it does not swing"
+    assert model.climb_speed * 0.8 < max(speeds) < model.climb_speed * 1.05
     assert model.height == pytest.approx(60.0, abs=0.5)
     assert model.vertical_speed == pytest.approx(0.0, abs=0.1)
     assert model.roll == 0.0
     assert model.acceleration == pytest.approx(GRAVITY, rel=0.02)
-
-
-def test_on_its_way_up_it_is_no_faster_than_its_climb_speed():
-    model = FlightModel(armed=True, target_height=60.0)
-    fastest = 0.0
-    while model.height < 50.0:
-        model.step(STEP)
-        fastest = max(fastest, model.vertical_speed)
-    assert model.climb_speed * 0.8 < fastest < model.climb_speed * 1.05
-
-
-def test_it_lands_softly_when_told_to():
-    model = hovering(10.0)
     model.target_height = 0.0
-    speeds = []
-    for _ in range(round(20.0 / STEP)):
-        model.step(STEP)
-        speeds.append(model.vertical_speed)
+    _, speeds = fly(model, 60.0)
     assert model.on_ground
     assert min(speeds) > -2.5
 
@@ -82,21 +67,11 @@ def test_after_a_motor_failure_it_falls_and_tumbles_to_its_terminal_speed():
     assert model.height > 0.0
 
 
-@pytest.mark.parametrize("why", ["disarmed", "failed"])
-def test_motors_that_are_off_do_not_hold_it(why):
-    model = hovering(60.0)
-    if why == "disarmed":
-        model.armed = False
-    else:
-        model.motors_failed = True
-    fly(model, 2.0)
-    assert model.vertical_speed < -12.0
-
-
 def test_the_canopy_opens_in_its_time_and_carries_at_its_speed():
     model = hovering(200.0)
     model.armed = False
     fly(model, 1.0)
+    assert model.vertical_speed < -7.0
     model.release()
     assert model.canopy == 0.0
     fly(model, model.canopy_opening_time / 2)
@@ -105,14 +80,8 @@ def test_the_canopy_opens_in_its_time_and_carries_at_its_speed():
     assert model.canopy == 1.0
     assert model.vertical_speed == pytest.approx(-model.canopy_speed, rel=0.02)
     assert model.roll == 0.0, "it hangs upright"
-
-
-def test_a_second_release_does_not_fold_the_canopy_again():
-    model = hovering(200.0)
     model.release()
-    fly(model, 2.0)
-    model.release()
-    assert model.canopy == 1.0
+    assert model.canopy == 1.0, "a second release does not fold it again"
 
 
 def test_it_touches_down_under_its_canopy_and_stays_there():
@@ -121,7 +90,8 @@ def test_it_touches_down_under_its_canopy_and_stays_there():
     model.release()
     fly(model, 30.0)
     assert model.on_ground
-    assert fly(model, 5.0) == [0.0] * round(5.0 / STEP)
+    heights, _ = fly(model, 5.0)
+    assert {*heights} == {0.0}
     assert model.vertical_speed == 0.0
     assert model.acceleration == pytest.approx(GRAVITY)
 
