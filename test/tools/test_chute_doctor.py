@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from heard_vehicle import Heard, heartbeat, stamped
 
+from chute_ros.ros.middleware import RANGE
 from chute_ros.tools.chute import doctor_computer as computer
 from chute_ros.tools.chute import doctor_ports as ports
 from chute_ros.tools.chute.diagnostic_tasks import Task
@@ -57,7 +58,7 @@ def test_the_worst_comes_first_each_on_one_line_with_its_remedy():
     [
         ({}, "ROS domain 0, discovery range SUBNET (the default), rmw_fastrtps_cpp"),
         (
-            {"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+            {"ROS_DOMAIN_ID": "7", RANGE: "LOCALHOST"},
             "ROS domain 7, discovery range LOCALHOST, rmw_fastrtps_cpp",
         ),
         (
@@ -75,7 +76,12 @@ def test_the_environment_is_told_as_the_user_set_it(environment, text):
 @pytest.mark.parametrize(
     ("environment", "levels", "told"),
     [
-        ({"ROS_DOMAIN_ID": "300"}, [WRONG], "ROS_DOMAIN_ID is '300'"),
+        ({"ROS_DOMAIN_ID": "300"}, [WRONG], "ROS_DOMAIN_ID is '300': need a whole number from 0"),
+        ({"ROS_DOMAIN_ID": "999999999999"}, [WRONG], "ROS_DOMAIN_ID is '999999999999': need"),
+        ({"ROS_DOMAIN_ID": "one"}, [WRONG], "ROS_DOMAIN_ID is 'one'"),
+        ({"ROS_DOMAIN_ID": "-1"}, [WRONG], "ROS_DOMAIN_ID is '-1'"),
+        ({RANGE: "FOO"}, [WRONG], f"{RANGE} is 'FOO': need OFF, LOCALHOST, SUBNET or SYSTEM_D"),
+        ({RANGE: "LOCALHOST "}, [WRONG], f"{RANGE} is 'LOCALHOST '"),
         ({"RMW_IMPLEMENTATION": "rmw_y"}, [WRONG], "installed: rmw_fastrtps_cpp, rmw_x"),
         ({"ROS_DOMAIN_ID": "150"}, [OK, NOTE], "may be taken by other programs"),
         ({"RMW_IMPLEMENTATION": "rmw_x"}, [OK, NOTE], "RMW_IMPLEMENTATION is rmw_x"),
@@ -251,35 +257,31 @@ def test_without_heartbeats_nothing_is_said_of_clocks(heard):
     assert clock_findings(heard.picture) == []
 
 
-def versions_of(heard, here="0.2.0", **versions):
-    """The findings where these nodes report these versions; an empty one is not reported."""
+DIFFER = "versions of chute_ros differ: 0.2.0 of a, upf_can; 0.1.0 of relay"
+SILENT = "no version of chute_ros is received of relay"
+OTHER = "the vehicle has chute_ros 0.1.0 of a, relay; this command is of 0.2.0"
+
+
+@pytest.mark.parametrize(
+    ("versions", "found"),
+    [
+        ({"upf_can": "0.2.0", "a": "0.2.0"}, []),
+        ({"upf_can": "0.2.0", "relay": "0.1.0", "a": "0.2.0"}, [(WRONG, DIFFER)]),
+        ({"relay": "", "a": "0.2.0"}, [(NOTE, SILENT)]),
+        ({"relay": "0.1.0", "a": "0.1.0"}, [(NOTE, OTHER)]),
+    ],
+    ids=["of one version", "of different ones", "without one", "of another than this command"],
+)
+def test_the_versions_of_nodes_are_compared(heard, versions, found):
+    """Given nodes that report these versions (an empty one is not reported), and a foreign one."""
     for node in versions:
         heard.hears(stamped(heartbeat(node)))
-    told = {"mavros": "9", **versions}
     tasks = [
         Task(f"drone1/{node}: middleware", "OK", "", {"chute_ros": one} if one else {}, 0.1)
-        for node, one in told.items()
+        for node, one in {"mavros": "9", **versions}.items()
     ]
-    return [(one.level, one.what) for one in version_findings(heard.picture, tasks, here)]
-
-
-def test_nodes_of_one_version_are_as_they_should_be(heard):
-    assert versions_of(heard, upf_can="0.2.0", a="0.2.0") == []
-
-
-def test_nodes_of_different_versions_are_named(heard):
-    differ = "versions of chute_ros differ: 0.2.0 of a, upf_can; 0.1.0 of relay"
-    assert versions_of(heard, upf_can="0.2.0", relay="0.1.0", a="0.2.0") == [(WRONG, differ)]
-
-
-def test_a_node_without_a_version_is_noted(heard):
-    silent = (NOTE, "no version of chute_ros is received of relay")
-    assert versions_of(heard, relay="", a="0.2.0") == [silent]
-
-
-def test_a_command_of_another_version_is_noted(heard):
-    other = "the vehicle has chute_ros 0.1.0 of a, relay; this command is of 0.2.0"
-    assert versions_of(heard, relay="0.1.0", a="0.1.0") == [(NOTE, other)]
+    told = version_findings(heard.picture, tasks, "0.2.0")
+    assert [(one.level, one.what) for one in told] == found
 
 
 def test_what_nodes_report_themselves():
