@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from panel_bench import LAPTOP, Panel, browser_path
+from panel_bench import LAPTOP, Panel, browser_path, password_file
 from panel_vehicles import vehicles_in
 from playwright.sync_api import sync_playwright
 
@@ -48,6 +48,22 @@ def start_panel(tmp_path, await_until, ros):
     yield make
     for one in panels:
         one.close()
+
+
+@pytest.fixture(scope="module")
+def panel_of_module(tmp_path_factory, await_until, ros):
+    folder = tmp_path_factory.mktemp("panel")
+    one = Panel(folder, allow_commands="true", password_file=password_file(folder))
+    yield one.started(await_until)
+    one.close()
+
+
+@pytest.fixture
+def panel(panel_of_module):
+    """One that takes orders, for all tests of a module: each leaves it as it was, and reads the
+    log of its own time."""
+    panel_of_module.log_begins_now()
+    return panel_of_module
 
 
 @pytest.fixture

@@ -47,6 +47,7 @@ class Panel:
 
     def __init__(self, folder, **parameters):
         self.processes = Processes(folder)
+        self._log_begins = 0
         self.port = parameters.setdefault("port", free_tcp_port())
         self.address = f"http://127.0.0.1:{self.port}"
         # NiceGUI would take it for a test of its own.
@@ -59,8 +60,12 @@ class Panel:
             os.environ[name] = kept
 
     def log(self):
-        """All that it wrote."""
-        return self.processes.log("panel").read_text()
+        """All that it wrote, since log_begins_now if that was called."""
+        return self.processes.log("panel").read_text()[self._log_begins :]
+
+    def log_begins_now(self):
+        """What it has written is of before."""
+        self._log_begins += len(self.log())
 
     def started(self, await_until):
         """Once it listens."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from panel_bench import password_file, press
+from panel_bench import press
 from panel_vehicles import ready_to_reset, until
 from playwright.sync_api import expect
 
@@ -21,8 +21,7 @@ def vehicles(fly):
 
 
 @pytest.fixture
-def page(fly, vehicles, namespace, start_panel, open_page, tmp_path):
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+def page(fly, vehicles, namespace, panel, open_page):
     return ready_to_reset(fly, panel, open_page, f"{namespace}/drone1")
 
 

@@ -32,11 +32,8 @@ def test_twenty_vehicles_on_a_phone_the_worst_first(fly, namespace, start_panel,
     picture(page, "fleet.jpg")
 
 
-def test_one_who_logged_out_elsewhere_orders_nothing(
-    fly, namespace, start_panel, open_page, tmp_path
-):
+def test_one_who_logged_out_elsewhere_orders_nothing(fly, namespace, panel, open_page):
     vehicles = fly({"drone1": Stage.LANDED})
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     address = f"{panel.address}/vehicle{namespace}/drone1"
     page = ready_to_reset(fly, panel, open_page, f"{namespace}/drone1")
     # Given a session that was ended on another page of the same browser,
@@ -65,10 +62,9 @@ def test_one_who_logged_out_elsewhere_orders_nothing(
 
 
 def test_beside_the_button_stands_that_no_parachute_can_be_reached(
-    fly, namespace, start_panel, open_page, tmp_path
+    fly, namespace, panel, open_page
 ):
     vehicles = fly({"drone1": Stage.IN_FLIGHT})
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
     log_in(page)
     note = page.get_by_role("alert").filter(has_text="PARACHUTE")
@@ -82,11 +78,8 @@ def test_beside_the_button_stands_that_no_parachute_can_be_reached(
     until(fly, lambda: not note.is_visible(), page)
 
 
-def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(
-    fly, namespace, start_panel, open_page, tmp_path
-):
+def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(fly, namespace, panel, open_page):
     vehicles = fly({"drone1": Stage.LANDED})
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     page = ready_to_reset(fly, panel, open_page, f"{namespace}/drone1")
     # Given a panel that hears its pages no more,
     panel.processes.send_signal("panel", signal.SIGSTOP)
@@ -103,17 +96,18 @@ def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(
 
 
 def test_without_permission_there_is_no_button_at_all(fly, namespace, start_panel, open_page):
-    fly({"drone1": Stage.READY})
+    fly({"drone1": Stage.FAULT})
     panel = start_panel()
     page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
+    word(page, "FAULT")
+    assert page.locator(".part-banner").get_attribute("role") == "status"
     assert page.locator(".hold").count() == 0
     assert page.get_by_text("log in").count() == 0
 
 
-def test_what_nobody_looks_at_is_not_listened_to(fly, namespace, start_panel, open_page):
+def test_what_nobody_looks_at_is_not_listened_to(fly, namespace, panel, open_page):
     vehicles = fly({"drone1": Stage.READY})
     topic = f"{namespace}/drone1/safety/state"
-    panel = start_panel()
     page = open_page(f"{panel.address}/fleet")
     link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
     until(fly, link.count, page)
@@ -131,19 +125,10 @@ def test_what_nobody_looks_at_is_not_listened_to(fly, namespace, start_panel, op
     assert vehicles.count_subscribers(f"{namespace}/drone1/safety/summary") == 0
 
 
-def test_a_vehicle_that_is_not_there_is_told(start_panel, open_page, ros):
-    panel = start_panel()
+def test_a_vehicle_that_is_not_there_is_told(panel, open_page):
     page = open_page(f"{panel.address}/vehicle/nowhere")
     told = re.compile("No supervisor is found in /nowhere. Vehicles found: ")
     expect(page.get_by_text(told)).to_be_visible(timeout=PATIENCE)
-
-
-def test_it_is_said_in_which_state_it_is(fly, namespace, start_panel, open_page):
-    fly({"drone1": Stage.FAULT})
-    panel = start_panel()
-    page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
-    word(page, "FAULT")
-    assert page.locator(".part-banner").get_attribute("role") == "status"
 
 
 def test_over_https_a_person_logs_in_and_orders(fly, namespace, start_panel, open_page, tmp_path):

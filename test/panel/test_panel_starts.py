@@ -12,9 +12,10 @@ import sys
 from urllib.parse import urlencode
 
 import pytest
-from panel_bench import PASSWORD, password_file
+from panel_bench import PASSWORD
 
 from chute_ros.errors import ParameterError
+from chute_ros.tools.panel.parameters import PanelSettings
 from chute_ros.tools.panel.password import password_from
 from chute_ros.tools.processes import ros_arguments
 
@@ -36,13 +37,26 @@ def started_with(**parameters):
     return done.returncode, done.stderr.strip().splitlines()[-1]
 
 
-def test_orders_need_a_password(ros):
-    code, told = started_with(allow_commands="true")
-    assert code == 2
-    assert told == (
-        "panel: parameter allow_commands is True and password_file is '': need a password: set "
-        "password_file, or leave allow_commands false"
-    )
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (
+            {"allow_commands": True},
+            (
+                "parameter allow_commands is True and password_file is '': need a password: set "
+                "password_file, or leave allow_commands false"
+            ),
+        ),
+        (
+            {"certificate_file": "a.pem"},
+            "parameter certificate_file is 'a.pem' and key_file is '': need both or neither",
+        ),
+    ],
+)
+def test_orders_need_a_password_and_https_both_files(settings, told):
+    with pytest.raises(ParameterError) as refused:
+        PanelSettings(**settings)
+    assert str(refused.value) == told
 
 
 @pytest.mark.parametrize(
@@ -94,11 +108,7 @@ def test_a_port_that_somebody_else_has(ros):
     )
 
 
-def test_https_needs_both_files(ros, tmp_path):
-    code, said = started_with(certificate_file=tmp_path / "a.pem")
-    assert code == 2
-    assert "certificate_file" in said
-    assert "key_file" in said
+def test_https_without_its_files_ends_with_a_word(ros, tmp_path):
     code, said = started_with(certificate_file=tmp_path / "a.pem", key_file=tmp_path / "b.pem")
     assert code == 2
     assert said == (
@@ -115,14 +125,9 @@ def test_https_with_a_certificate_that_is_none_ends_with_a_word(ros, tmp_path):
     assert said.startswith("panel: parameters certificate_file and key_file: ")
 
 
-@pytest.fixture
-def panel(start_panel, tmp_path):
-    return start_panel(allow_commands="true", password_file=password_file(tmp_path))
-
-
-def asked(panel, method, path, body="", **headers):
-    """(status, headers, text) of one request."""
-    connection = http.client.HTTPConnection("127.0.0.1", panel.port, timeout=20.0)
+def asked(panel, method, path, body="", whence="127.0.0.1", **headers):
+    """(status, headers, text) of one request from this address."""
+    connection = http.client.HTTPConnection("127.0.0.1", panel.port, 20.0, (whence, 0))
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
     if body:
         sent["content-type"] = "application/x-www-form-urlencoded"
@@ -160,15 +165,16 @@ def test_a_login_leads_to_no_other_page(panel):
 
 
 def test_guessing_is_told_and_kept_waiting(panel):
+    whence = "127.0.0.2"
     for _ in range(3):
-        status, _, text = logged_in(panel, "guess")
+        status, _, text = logged_in(panel, "guess", whence=whence)
         assert status == 403
         assert "wrong password" in text
-    status, headers, text = logged_in(panel)
+    status, headers, text = logged_in(panel, whence=whence)
     assert status == 403
     assert "too many wrong passwords: try again in" in text
     assert "set-cookie" not in headers
-    assert "login of 'Anna' from 127.0.0.1: wrong password" in panel.log()
+    assert f"login of 'Anna' from {whence}: wrong password" in panel.log()
     assert "guess" not in panel.log()
 
 
@@ -205,7 +211,8 @@ def test_garbage_harms_nobody(panel):
     assert "Traceback" not in panel.log()
 
 
-def test_ctrl_c_ends_it_at_once_with_pages_open(panel, open_page):
+def test_ctrl_c_ends_it_at_once_with_pages_open(start_panel, open_page):
+    panel = start_panel()
     page = open_page(f"{panel.address}/fleet")
     page.locator(".fleet, .none").first.wait_for()
     panel.processes.send_signal("panel", signal.SIGINT)

@@ -29,9 +29,8 @@ def get(panel, path, **headers):
         connection.close()
 
 
-def test_names_that_are_none_do_not_end_it(fly, namespace, start_panel, open_page):
+def test_names_that_are_none_do_not_end_it(fly, namespace, panel, open_page):
     vehicles = fly({"drone1": Stage.READY})
-    panel = start_panel()
     page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
     publisher = vehicles.create_publisher(ParachuteStatus, "drone1/parachute/status", qos.STATUS)
     names = (
@@ -56,7 +55,7 @@ def test_names_that_are_none_do_not_end_it(fly, namespace, start_panel, open_pag
     assert panel.processes.check() is None
 
 
-def test_many_pages_that_nobody_looks_at_do_not_end_it(start_panel, ros):
+def test_many_pages_that_nobody_looks_at_do_not_end_it(start_panel, await_until):
     panel = start_panel()
     assert get(panel, "/nowhere") == (404, "There is no such page: / has all vehicles.\n")
     seen = {get(panel, "/fleet")[0] for _ in range(3 * MOST_PAGES)}
@@ -64,18 +63,12 @@ def test_many_pages_that_nobody_looks_at_do_not_end_it(start_panel, ros):
     status, text = get(panel, "/fleet")
     assert (status, text.partition(":")[0]) == (503, "refused")
     assert get(panel, "/login")[0] == 200
+    # Pages that were left make room.
+    await_until(lambda: get(panel, "/fleet")[0] == 200, "there is room again", 30.0)
     assert panel.processes.check() is None
 
 
-def test_pages_that_were_left_make_room(start_panel, ros, await_until):
-    panel = start_panel()
-    while get(panel, "/fleet")[0] == 200:
-        pass
-    await_until(lambda: get(panel, "/fleet")[0] == 200, "there is room again", 30.0)
-
-
-def test_no_visitor_writes_lines_of_the_log(start_panel, open_page, ros):
-    panel = start_panel()
+def test_no_visitor_writes_lines_of_the_log(panel, open_page):
     page = open_page(f"{panel.address}/fleet")
     expect(page.locator(".none, .fleet").first).to_be_visible(timeout=PATIENCE)
     page.evaluate(
@@ -97,9 +90,8 @@ def test_no_visitor_writes_lines_of_the_log(start_panel, open_page, ros):
     assert len(panel.log().splitlines()) < 60
 
 
-def test_invented_namespaces_do_not_hide_a_vehicle(fly, namespace, start_panel, open_page):
+def test_invented_namespaces_do_not_hide_a_vehicle(fly, namespace, panel, open_page):
     fly({f"a{number:02}": Stage.READY for number in range(60)} | {"zulu": Stage.FAULT})
-    panel = start_panel()
     page = open_page(f"{panel.address}/vehicle{namespace}/zulu")
     until(fly, lambda: "FAULT" in page.locator("body").inner_text(), page)
     page.goto(f"{panel.address}/fleet")
