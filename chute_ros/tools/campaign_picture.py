@@ -7,6 +7,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import escape
 
 from chute_ros.campaign.campaign import FlightSummary
+from chute_ros.tools.pages import drawing
 
 #: Bars of each.
 _BARS = 60
@@ -40,18 +41,13 @@ def groups_of(lines: Iterable[FlightSummary]) -> dict[str, list[FlightSummary]]:
 def picture(lines: Sequence[FlightSummary], what: str) -> str:
     """As SVG. what: a number of a line that is known for each."""
     groups = groups_of(lines)
-    height = max(1, len(groups)) * _HEIGHT
-    size = f'viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="12"'
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size}>',
-        f'<rect width="{_WIDTH}" height="{height}" fill="white"/>',
-    ]
+    parts: list[str] = []
     for number, (name, some) in enumerate(groups.items()):
         axis = _AXES[what]
         scale = axis.for_rocket if name == "rocket" else 1.0
         values = [getattr(line, what) for line in some]
         parts += _bars(f"{name}: {len(some)}, {axis.title}", values, axis, scale, number * _HEIGHT)
-    return "\n".join([*parts, "</svg>"]) + "\n"
+    return drawing(_WIDTH, max(1, len(groups)) * _HEIGHT, parts)
 
 
 def _bars(title: str, values: Sequence[float], axis: _Axis, scale: float, top: float) -> list[str]:

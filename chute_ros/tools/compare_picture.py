@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape
 from chute_ros.campaign.comparison import FACTORS, Compared
 from chute_ros.campaign.guards import GUARDS, OURS
 from chute_ros.tools.compare_page import shares
+from chute_ros.tools.pages import drawing
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _RIGHT, _BOTTOM = 760, 360, 60, 36, 200, 46
 #: By guard, in their order; ours is the thick one.
@@ -44,7 +45,7 @@ def curves(lines: Sequence[Compared]) -> str:
             for (x, y), (factor, _) in zip(at, points, strict=True):
                 panel.dot(x, y, colour, 5.0 if factor == 1.0 else 2.5)
         panels += panel.parts
-    return _svg(panels, len(_profiles(lines)))
+    return drawing(_WIDTH, max(1, len(_profiles(lines))) * _HEIGHT, panels)
 
 
 def delays(lines: Sequence[Compared]) -> str:
@@ -63,7 +64,7 @@ def delays(lines: Sequence[Compared]) -> str:
             of = [one for one in plain if (one.profile, one.guard) == (profile, guard.name)]
             panel.line(_steps(of), colour, guard is OURS)
         panels += panel.parts
-    return _svg(panels, len(_profiles(lines)))
+    return drawing(_WIDTH, max(1, len(_profiles(lines))) * _HEIGHT, panels)
 
 
 def _profiles(lines: Sequence[Compared]) -> list[str]:
@@ -142,11 +143,3 @@ class _Panel:
         """At a point."""
         at, level = self._at(x, y)
         self.parts.append(f'<circle cx="{at:.1f}" cy="{level:.1f}" r="{radius}" fill="{colour}"/>')
-
-
-def _svg(parts: Sequence[str], panels: int) -> str:
-    height = max(1, panels) * _HEIGHT
-    size = f'viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="12"'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
-    ground = f'<rect width="{_WIDTH}" height="{height}" fill="white"/>'
-    return "\n".join([head, ground, *parts, "</svg>"]) + "\n"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
 from chute_ros.campaign.heights import CaseFlights
+from chute_ros.tools.pages import drawing
 
 _WIDTH, _LEFT, _RIGHT, _TOP, _ROW, _BOTTOM = 880, 210, 110, 62, 34, 44
 _BAR, _DOT = 18, 1.7
@@ -34,11 +35,7 @@ def picture(every: Sequence[CaseFlights], minimum_height: float) -> str:
         )
     for row, found in enumerate(every):
         parts += _row(found, scale, _TOP + _ROW * row)
-    height = floor + _BOTTOM
-    size = f'viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="12"'
-    ground = f'<rect width="{_WIDTH}" height="{height}" fill="white"/>'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
-    return "\n".join([head, ground, *parts, "</svg>"]) + "\n"
+    return drawing(_WIDTH, floor + _BOTTOM, parts)
 
 
 def _legend() -> list[str]:

@@ -1,5 +1,5 @@
-"""Pages that tools write: tables, what they tell of many values, their parts, and files that are
-up to date or not."""
+"""Pages that tools write: tables, pictures, what they tell of many values, their parts, and files
+that are up to date or not."""
 
 from __future__ import annotations
 
@@ -19,6 +19,14 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _row(cells: Sequence[str]) -> str:
     return "|" + "|".join(f" {one} " if one else " " for one in cells) + "|"
+
+
+def drawing(width: int, height: float, parts: Iterable[str]) -> str:
+    """These parts on white, as a file of SVG."""
+    size = f'viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>'
+    ground = f'<rect width="{width}" height="{height}" fill="white"/>'
+    return "\n".join([head, ground, *parts, "</svg>"]) + "\n"
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, float]:

@@ -69,8 +69,7 @@ def parameters_text(before: str) -> str:
             (f"`{p.name}`", f"`{_yaml(p.default)}`", p.meaning, _allowed(p)) for p in parameters
         ]
         rows += [f"## {node}", "", table(("parameter", "default", "meaning", "allowed"), told), ""]
-    begin, end = "<!-- parameters -->", "<!-- end of parameters -->"
-    return _between(before, PARAMETERS, begin, end, rows[:-1])
+    return _with_part(before, PARAMETERS, "parameters", rows[:-1])
 
 
 def rules_text(before: str) -> str:
@@ -81,8 +80,7 @@ def rules_text(before: str) -> str:
         numbers = (one.rate, one.jump, one.max_age, one.stuck_after)
         span = f"{one.minimum:g} to {one.maximum:g}"
         rows.append((f"`{name}`", UNITS[name], span, *(f"{number:g}" for number in numbers)))
-    begin, end = "<!-- measurements -->", "<!-- end of measurements -->"
-    return _between(before, RULES, begin, end, [table(head, rows)])
+    return _with_part(before, RULES, "measurements", [table(head, rows)])
 
 
 def description_text(before: str) -> str:
@@ -92,11 +90,11 @@ def description_text(before: str) -> str:
         for name, one in FIELDS.items()
     ]
     head = ("field", "meaning", "allowed", "if left out")
-    begin, end = "<!-- description -->", "<!-- end of description -->"
-    return _between(before, DESCRIPTION, begin, end, [table(head, rows)])
+    return _with_part(before, DESCRIPTION, "description", [table(head, rows)])
 
 
-def _between(before: str, path: Path, begin: str, end: str, rows: list[str]) -> str:
+def _with_part(before: str, path: Path, name: str, rows: list[str]) -> str:
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
     head, found, rest = before.partition(begin)
     _, found_end, tail = rest.partition(end)
     if not found or not found_end:

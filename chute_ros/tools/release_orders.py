@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 
 from chute_msgs.srv import ParachuteAction, UpfCommand
 
-from chute_ros.model import NAN, Action, Decision, Outcome, ParachuteStatus
+from chute_ros.model import (
+    NAN,
+    Action,
+    Decision,
+    DeploymentTrigger,
+    Outcome,
+    ParachuteStatus,
+    name_of,
+)
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.tools.flight_story import Asked, Decided, FlightStory
@@ -98,6 +106,12 @@ class ReleaseOrder:
         named = self.link == turned.link and self.is_for(turned.status.device)
         in_time = self.release.at <= turned.at <= self.until + _EFFECT_WITHIN
         return self.is_sent and named and in_time
+
+
+def trigger_of(status: ParachuteStatus) -> str:
+    """What released a parachute that says deployed, as itself says."""
+    number = status.deployment_trigger
+    return f"trigger {name_of(DeploymentTrigger, number)}" if number else "no trigger named"
 
 
 def decided(story: FlightStory, end: float) -> Iterator[ReleaseOrder]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bisect
 
-from chute_ros.model import DeploymentTrigger, LinkState, VehicleState, name_of
+from chute_ros.model import LinkState, VehicleState
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.release_orders import (
     MotionThen,
@@ -17,6 +17,7 @@ from chute_ros.tools.release_orders import (
     decided,
     foreign,
     in_vain,
+    trigger_of,
 )
 
 
@@ -105,9 +106,8 @@ class _Own:
 
 
 def _step(turned: TurnedDeployed, after: float) -> ReleaseStep:
-    number = turned.status.deployment_trigger
-    trigger = f"trigger {name_of(DeploymentTrigger, number)}" if number else "no trigger named"
-    text = f"{turned.status.device}, {trigger}; not deployed {turned.silent:.1f} s before"
+    status = turned.status
+    text = f"{status.device}, {trigger_of(status)}; not deployed {turned.silent:.1f} s before"
     return ReleaseStep(after, "own status", "deployed", "act", text)
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from chute_ros.model import DeploymentTrigger, ParachuteStatus, name_of
+from chute_ros.model import ParachuteStatus
 from chute_ros.tools.flight_story import Asked, FlightStory
-from chute_ros.tools.release_orders import MotionThen, Release
+from chute_ros.tools.release_orders import MotionThen, Release, trigger_of
 from chute_ros.tools.report_parts import cell, listing, number, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -103,9 +103,7 @@ def parachutes_of(story: FlightStory) -> str:
 def _deployed(status: ParachuteStatus) -> str:
     if not status.deployed:
         return "no, or not known"
-    number = status.deployment_trigger
-    trigger = f"trigger {name_of(DeploymentTrigger, number)}" if number else "no trigger named"
-    return f'<b class="act">deployed</b>, {trigger}'
+    return f'<b class="act">deployed</b>, {trigger_of(status)}'
 
 
 def _motion(motion: MotionThen) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from chute_ros.tools.chute.view import (
     ParachuteView,
     RuleView,
     VehiclePicture,
+    VehicleView,
 )
 from chute_ros.tools.chute.words import age_text, is_old, not_here, value_text
 from chute_ros.tools.timeline_rows import ACTION_TONES, LINK_TONES, STAGE_TONES
@@ -222,11 +224,14 @@ def _unusable_in_short(picture: VehiclePicture) -> list[StatusLine]:
     return [StatusLine(_named("cannot be used", ", ".join(names)), "warn", rows=1)]
 
 
-def _link(one: LinkView) -> StatusLine:
+def link_tone(one: LinkView) -> str:
+    """A link is no better than its device."""
     tone = LINK_TONE.get(one.state, "warn")
-    if one.state == LinkState.OK.name and not one.device_healthy:
-        tone = "warn"
-    return StatusLine(_named(one.name, link_text(one)), tone)
+    return "warn" if tone == "good" and not one.device_healthy else tone
+
+
+def _link(one: LinkView) -> StatusLine:
+    return StatusLine(_named(one.name, link_text(one)), link_tone(one))
 
 
 def _parachute(one: ParachuteView) -> Iterator[StatusLine]:
@@ -247,6 +252,14 @@ def _parachute(one: ParachuteView) -> Iterator[StatusLine]:
         yield StatusLine(_named("", f"fault: {fault}"), "bad")
 
 
+def battery_text(one: VehicleView) -> str:
+    """Its voltage, and what is left of it if that is known."""
+    voltage = value_text(one.battery_voltage, "V")
+    if math.isnan(one.battery_remaining):
+        return voltage
+    return f"{voltage}, {one.battery_remaining * 100.0:.0f} %"
+
+
 def _vehicle(picture: VehiclePicture) -> Iterator[StatusLine]:
     one = picture.vehicle
     if one is None:
@@ -256,15 +269,12 @@ def _vehicle(picture: VehiclePicture) -> Iterator[StatusLine]:
     yield StatusLine(
         f"vehicle {one.source or 'of no known source'}, link {one.link_state}", "head"
     )
-    battery = value_text(one.battery_voltage, "V")
-    if one.battery_remaining == one.battery_remaining:
-        battery += f", {one.battery_remaining * 100.0:.0f} %"
     for name, value, age in (
         ("arming state", one.armed, one.armed_age),
         ("landed state", one.landed_state, one.landed_state_age),
         ("height", value_text(one.height, "m"), one.height_age),
         ("vertical speed", value_text(one.vertical_speed, "m/s"), one.vertical_speed_age),
-        ("battery", battery, one.battery_age),
+        ("battery", battery_text(one), one.battery_age),
     ):
         # A value that was never received is none.
         told = f"{value}, {age_text(age)}" if age == age else age_text(age)

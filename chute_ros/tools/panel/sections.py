@@ -14,8 +14,10 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.status_text import (
     LINK_TONE,
+    battery_text,
     headline,
     link_text,
+    link_tone,
     newest_fired,
     parachute_age_text,
 )
@@ -128,9 +130,6 @@ def vehicle(picture: VehiclePicture) -> str:
     one = picture.vehicle
     if one is None:
         return _card("Vehicle", _row("", not_here(picture.listened), "warn"), True)
-    battery = value_text(one.battery_voltage, "V")
-    if one.battery_remaining == one.battery_remaining:
-        battery += f", {one.battery_remaining * 100.0:.0f} %"
     attitude = ", ".join(
         f"{name} {value_text(math.degrees(angle), '°', 0)}"
         for name, angle in (("roll", one.roll), ("pitch", one.pitch), ("yaw", one.yaw))
@@ -144,7 +143,7 @@ def vehicle(picture: VehiclePicture) -> str:
             ("attitude", attitude, one.attitude_age),
             ("arming state", one.armed, one.armed_age),
             ("landed state", one.landed_state, one.landed_state_age),
-            ("battery", battery, one.battery_age),
+            ("battery", battery_text(one), one.battery_age),
         )
     )
     rows += "".join(_row("fault", fault, "bad") for fault in one.faults)
@@ -253,10 +252,7 @@ def _packed(date: str, today: datetime.date) -> str:
 
 
 def _link(one: LinkView, old: bool) -> str:
-    tone = LINK_TONE.get(one.state, "warn")
-    if tone == "good" and not one.device_healthy:
-        tone = "warn"
-    return _row(one.name, link_text(one), "quiet" if old else tone)
+    return _row(one.name, link_text(one), "quiet" if old else link_tone(one))
 
 
 def _measured(name: str, value: str, age: float) -> str:
