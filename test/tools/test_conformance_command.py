@@ -9,13 +9,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 from command_bench import refused
-from conformance_processes import COMMAND, started
+from conformance_processes import COMMAND, SIMULATOR, Bench, started
 from junitparser import JUnitXml
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -30,43 +30,22 @@ from chute_ros.ros.own_version import hash_of, own_version
 from chute_ros.tools.conformance import command
 from chute_ros.tools.isolation import free_udp_ports
 
-SIMULATOR = [sys.executable, "-u", "-m"]
-SIMULATOR += ["chute_ros.links.mavlink.simulator.sim_mavlink_parachute"]
+MAVLINK = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
+UPF = "chute_ros.links.upf.simulator.sim_upf"
 QUICK = ["--only", "request-status", "unknown-command"]
 
 
-class Bench:
-    """A device on loopback. connection: of the kit."""
-
-    def __init__(self, *options: str) -> None:
-        ours, theirs = free_udp_ports(2)
-        self.connection = f"udppair:127.0.0.1:{ours}:127.0.0.1:{theirs}"
-        self._device = [
-            *SIMULATOR,
-            "--connection",
-            f"udppair:127.0.0.1:{theirs}:127.0.0.1:{ours}",
-            *options,
-        ]
-
-    @contextmanager
-    def trying(self, *options: str) -> Iterator[subprocess.Popen[str]]:
-        """The device, and the kit that tries it."""
-        with ExitStack() as both:
-            both.enter_context(started(*self._device))
-            kit = [*COMMAND, "mavlink", "--connection", self.connection]
-            yield both.enter_context(started(*kit, *options))
-
-    def run(self, *options: str, typed: str = "") -> tuple[int, str, str]:
-        """(exit code, output, errors) of the kit."""
-        with self.trying(*options) as kit:
-            out, errors = kit.communicate(typed, timeout=60.0)
-            return kit.returncode, out, errors
+def bench(*options: str) -> Bench:
+    """A parachute on loopback."""
+    ours, theirs = (f"127.0.0.1:{port}" for port in free_udp_ports(2))
+    device = (MAVLINK, "--connection", f"udppair:{theirs}:{ours}", *options)
+    return Bench(device, ("mavlink", "--connection", f"udppair:{ours}:{theirs}"))
 
 
 def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
     page, verdicts, traffic = (tmp_path / name for name in ("a.html", "a.xml", "a.mcap"))
     files = ["--html", str(page), "--junit", str(verdicts), "--mcap", str(traffic)]
-    code, out, errors = Bench().run(*QUICK, *files)
+    code, out, errors = bench().run(*QUICK, *files)
     assert (code, errors) == (0, "")
     assert "mavlink 1/161: 2 passed\n" in out
     told = page.read_text()
@@ -87,18 +66,17 @@ def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
     assert {"HEARTBEAT", "COMMAND_LONG", "COMMAND_ACK"} <= {one["name"] for one in packets}
 
 
-def test_a_recording_goes_over_an_earlier_one_and_over_no_black_box(tmp_path: Path) -> None:
+def test_a_recording_goes_over_an_earlier_one_and_over_no_black_box(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
     file = tmp_path / "a.mcap"
-    for _ in range(2):
-        code, _, errors = Bench().run("--only", "request-status", "--mcap", str(file))
-        assert (code, errors) == (0, "")
-    with file.open("wb") as box:
-        writer = Writer(box)
-        writer.start(profile="ros2", library="chute_ros")
-        writer.finish()  # type: ignore[no-untyped-call]
+    recorded_by(file, profile="", library="chute_ros conformance")
     before = file.read_bytes()
-    code, out, errors = Bench().run("--only", "request-status", "--mcap", str(file))
-    assert (code, out) == (2, "")
+    code, _, errors = bench().run("--only", "request-status", "--mcap", str(file))
+    assert (code, errors, file.read_bytes() != before) == (0, "", True)
+    recorded_by(file, profile="ros2", library="chute_ros")
+    before = file.read_bytes()
+    _, errors = refused(command, monkeypatch, capsys, "mavlink", "--mcap", str(file))
     assert errors == (
         f"conformance: {file} exists and is no MCAP recording of conformance: remove it, or name "
         "another\n"
@@ -106,9 +84,17 @@ def test_a_recording_goes_over_an_earlier_one_and_over_no_black_box(tmp_path: Pa
     assert file.read_bytes() == before
 
 
+def recorded_by(file: Path, **head: str) -> None:
+    """An empty recording."""
+    with file.open("wb") as opened:
+        writer = Writer(opened)
+        writer.start(**head)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
 def test_a_clause_that_fails_ends_with_1(tmp_path: Path) -> None:
     verdicts = tmp_path / "a.xml"
-    code, out, _ = Bench("--break", "unknown-command").run(*QUICK, "--junit", str(verdicts))
+    code, out, _ = bench("--break", "unknown-command").run(*QUICK, "--junit", str(verdicts))
     assert code == 1
     assert "FAILED         unknown-command" in out
     (suite,) = JUnitXml.fromfile(str(verdicts))
@@ -134,7 +120,7 @@ def test_without_the_word_typed_again_nothing_is_sent(option: str, word: str, ty
 
 
 def test_with_the_word_it_fires() -> None:
-    code, out, errors = Bench().run("--fire", "--only", "release", typed="FIRE\n")
+    code, out, errors = bench().run("--fire", "--only", "release", typed="FIRE\n")
     assert (code, errors) == (0, "")
     assert "release: IT RELEASES" in out
     assert "passed         release              DRONE, reported after" in out
@@ -143,7 +129,7 @@ def test_with_the_word_it_fires() -> None:
 @contextmanager
 def allowed_to_arm(*options: str) -> Iterator[subprocess.Popen[str]]:
     """The kit, as soon as it has found the device."""
-    with Bench().trying("--arm", *options) as kit:
+    with bench().trying("--arm", *options) as kit:
         assert kit.stdin is not None
         assert kit.stdout is not None
         kit.stdin.write("ARM\n")
@@ -280,16 +266,11 @@ def test_before_each_step_stands_what_the_device_may_do(device: str) -> None:
 def test_clauses_of_another_kind_of_device_are_counted_in_one_line(tmp_path: Path) -> None:
     """Given --trigger: they stay in the report."""
     report = tmp_path / "a.xml"
-    connection = f"mcast:0:{free_udp_ports(1)[0]}"
-    options = ["--connection", connection, "--trigger", "--junit", str(report)]
+    connection = ("--connection", f"mcast:0:{free_udp_ports(1)[0]}")
     names = ["--only", "node-id", "parameters", "trigger-node-id"]
-    simulator = [sys.executable, "-u", "-m", "chute_ros.links.upf.simulator.sim_upf"]
-    with started(*simulator, "--no-controller", "--connection", connection) as simulated:
-        assert simulated.stdout is not None
-        simulated.stdout.readline()
-        with started(*COMMAND, "upf", *options, *names) as kit:
-            out, errors = kit.communicate(timeout=60.0)
-    assert (kit.returncode, errors) == (0, "")
+    trigger = Bench((UPF, "--no-controller", *connection), ("upf", *connection), True)
+    code, out, errors = trigger.run("--trigger", "--junit", str(report), *names)
+    assert (code, errors) == (0, "")
     assert out.splitlines()[:2] == [
         "found node 34",
         "  not tried      2 clauses that are of another kind of device",
@@ -305,12 +286,8 @@ def test_clauses_of_another_kind_of_device_are_counted_in_one_line(tmp_path: Pat
 ROS = ("rclpy*", "builtin_interfaces", "rosidl*", "ament*", "rpyutils", "chute_msgs.msg")
 #: Device -> its simulator, the clause that is tried, and the folder of its messages.
 WITHOUT_ROS = {
-    "mavlink": ("chute_ros.links.mavlink.simulator.sim_mavlink_parachute", "request-status", ()),
-    "upf": (
-        "chute_ros.links.upf.simulator.sim_upf",
-        "node-info",
-        ("--dsdl-path", "msg_defs/dsdl/flyfire"),
-    ),
+    "mavlink": (MAVLINK, "request-status", ()),
+    "upf": (UPF, "node-info", ("--dsdl-path", "msg_defs/dsdl/flyfire")),
     "umbilical": (
         "chute_ros.links.umbilical.simulator.sim_flight_computer",
         "flash-info",
@@ -346,7 +323,7 @@ def test_a_kit_lists_and_tries_without_ros(
     assert (kit.returncode, errors) == (0, "")
     assert f"\n{clause} " in out
     told, connection = connections(device, tmp_path)
-    simulator = [sys.executable, "-u", "-m", module, *told, *folder]
+    simulator = [*SIMULATOR, module, *told, *folder]
     page = tmp_path / "a.html"
     options = ["--connection", connection, *folder, "--only", clause, "--html", str(page)]
     with started(*simulator, environment=without_ros) as simulated:
