@@ -14,7 +14,7 @@ from chute_ros.tools.launch_checks import FAILURES, FlightArguments
 from chute_ros.tools.simulated_vehicle import own_folder, simulator_module, simulators_of
 
 DRONE, ROCKET = simulators_of("mavlink"), simulators_of("umbilical")
-CALM = ["--at", "0:wind=0.5"]
+CALM, FLIES = ["--at", "0:wind=0.5"], {"fly": "60"}
 
 
 def test_one_that_stands_is_told_nothing_but_of_light_air():
@@ -50,61 +50,60 @@ def test_each_failure_is_an_action_of_the_table_and_of_some_vehicle():
         ]
         assert able, word
         for name in able:
-            begin = {"launch": "1"} if name == "umbilical" else {"fly": "60"}
+            begin = {"launch": "1"} if name == "umbilical" else FLIES
             assert FlightArguments(**begin, fail=f"{word}@1").options(simulators_of(name))
 
 
-MISTAKES = {
-    FlightArguments(fly="high"): "fly is 'high': need a height from 1 to 500 (m), for example 60",
-    FlightArguments(fly="0.5"): "fly is '0.5': need a height from 1 to 500 (m)",
-    FlightArguments(fly="nan"): "fly is 'nan': need a height from 1 to 500 (m)",
-    FlightArguments(wind="31"): "wind is '31': need a speed from 0 to 30 (m/s), for example 5",
-    FlightArguments(wind="-1"): "wind is '-1': need a speed from 0 to 30 (m/s)",
-    FlightArguments(fail="motor@5"): "fail is 'motor@5': need fly too, which it counts from",
-    FlightArguments(
-        fly="60", fail="motor"
-    ): "fail is 'motor': need one of motor, autopilot, telemetry, ",
-    FlightArguments(
-        fly="60", fail="motor@"
-    ): "@ and seconds after the take-off or launch from 0 to 3600",
-    FlightArguments(fly="60", fail="motor@-1"): "fail is 'motor@-1': need one of ",
-    FlightArguments(fly="60", fail="motor@inf"): "fail is 'motor@inf': need one of ",
-    FlightArguments(fly="60", fail="engine@5"): "for example motor@15",
-    FlightArguments(fly="60", fail="motor@5,drogue@1"): "fail is 'drogue@1': need one of motor, ",
-    FlightArguments(
-        launch="12"
-    ): "launch is '12': need a vehicle with sim_flight_computer; this one has "
-    "sim_autopilot, sim_mavlink_parachute",
-}
+NO_HEIGHT, NO_SPEED = "need a height from 1 to 500 (m)", "need a speed from 0 to 30 (m/s)"
 
 
-@pytest.mark.parametrize("flight", MISTAKES, ids=str)
-def test_a_mistake_names_the_argument_the_value_and_what_is_needed(flight):
+@pytest.mark.parametrize(
+    ("simulators", "given", "told"),
+    [
+        (DRONE, {"fly": "high"}, f"fly is 'high': {NO_HEIGHT}, for example 60"),
+        (DRONE, {"fly": "0.5"}, f"fly is '0.5': {NO_HEIGHT}"),
+        (DRONE, {"fly": "nan"}, f"fly is 'nan': {NO_HEIGHT}"),
+        (DRONE, {"wind": "31"}, f"wind is '31': {NO_SPEED}, for example 5"),
+        (DRONE, {"wind": "-1"}, f"wind is '-1': {NO_SPEED}"),
+        (DRONE, {"fail": "motor@5"}, "fail is 'motor@5': need fly too, which it counts from"),
+        (DRONE, FLIES | {"fail": "motor"}, "fail is 'motor': need one of motor, autopilot, "),
+        (
+            DRONE,
+            FLIES | {"fail": "motor@"},
+            "@ and seconds after the take-off or launch from 0 to",
+        ),
+        (DRONE, FLIES | {"fail": "motor@-1"}, "fail is 'motor@-1': need one of "),
+        (DRONE, FLIES | {"fail": "motor@inf"}, "fail is 'motor@inf': need one of "),
+        (DRONE, FLIES | {"fail": "engine@5"}, "for example motor@15"),
+        (DRONE, FLIES | {"fail": "motor@5,drogue@1"}, "fail is 'drogue@1': need one of motor, "),
+        (
+            DRONE,
+            {"launch": "12"},
+            f"launch is '12': need a vehicle with {ROCKET[0]}; this one has {', '.join(DRONE)}",
+        ),
+        (ROCKET, {"launch": "soon"}, "launch is 'soon': need a time after the start from 0 to 36"),
+        (
+            ROCKET,
+            FLIES,
+            "fly is '60': need a vehicle with sim_autopilot; this one has sim_flight_",
+        ),
+        (ROCKET, {"wind": "5"}, "wind is '5': need a vehicle with sim_autopilot"),
+        (
+            ROCKET,
+            {"fail": "drogue@5"},
+            "fail is 'drogue@5': need launch too, which it counts from",
+        ),
+        (
+            ROCKET,
+            {"launch": "5", "fail": "motor@5"},
+            "fail is 'motor@5': need one of drogue, computer, ",
+        ),
+    ],
+)
+def test_a_mistake_names_the_argument_the_value_and_what_is_needed(simulators, given, told):
     with pytest.raises(ParameterError) as caught:
-        flight.options(DRONE)
-    assert MISTAKES[flight] in str(caught.value)
-
-
-OF_A_ROCKET = {
-    FlightArguments(
-        launch="soon"
-    ): "launch is 'soon': need a time after the start from 0 to 3600 (s)",
-    FlightArguments(
-        fly="60"
-    ): "fly is '60': need a vehicle with sim_autopilot; this one has sim_flight_co",
-    FlightArguments(wind="5"): "wind is '5': need a vehicle with sim_autopilot",
-    FlightArguments(fail="drogue@5"): "fail is 'drogue@5': need launch too, which it counts from",
-    FlightArguments(
-        launch="5", fail="motor@5"
-    ): "fail is 'motor@5': need one of drogue, computer, ",
-}
-
-
-@pytest.mark.parametrize("flight", OF_A_ROCKET, ids=str)
-def test_a_mistake_with_a_rocket_too(flight):
-    with pytest.raises(ParameterError) as caught:
-        flight.options(ROCKET)
-    assert OF_A_ROCKET[flight] in str(caught.value)
+        FlightArguments(**given).options(simulators)
+    assert told in str(caught.value)
 
 
 def test_the_folder_of_the_sockets_is_for_this_user_alone(tmp_path):
