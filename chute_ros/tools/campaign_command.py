@@ -35,9 +35,8 @@ from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
 from chute_ros.tools.arguments import positive
 from chute_ros.tools.campaign_bodies import page_of_bodies
-from chute_ros.tools.campaign_page import page
+from chute_ros.tools.campaign_page import page, plan
 from chute_ros.tools.campaign_picture import picture
-from chute_ros.tools.campaign_plan import plan
 from chute_ros.tools.campaign_vehicle import FLIGHTS, fly_described, refuse_unfit
 from chute_ros.tools.machine import machine
 from chute_ros.tools.page_file import MARKDOWN, SVG, require_output, write_page

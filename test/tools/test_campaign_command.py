@@ -20,11 +20,14 @@ from chute_ros.campaign.judge import Count, JudgedFlight
 from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
+from chute_ros.tools.campaign_page import plan
 from chute_ros.tools.machine import machine
 
 TAPES = str(Path(__file__).parents[1] / "campaign" / "tapes" / "bodies.tapes")
 #: Flights from this one on are short.
 SHORT = 114
+#: For a process of it: it tells of each flight, not of some together.
+ONE_BY_ONE = "from chute_ros.campaign import pool; pool._BUNDLE = 1"
 
 run = partial(call, campaign)
 
@@ -99,13 +102,13 @@ def test_of_each_kind_it_flies_the_first(monkeypatch, tmp_path, capsys):
     page = tmp_path / "campaign.md"
     with_page = ("--jobs", "1", "--page", str(page), "--failures", str(tmp_path / "failures"))
     monkeypatch.setattr(campaign, "rare", lambda seeds, each: list(seeds)[5 : 5 + 2 * each])
-    run(monkeypatch, "--flights", "30", "--seed", "110", "--each", "2", *with_page)
+    run(monkeypatch, "--flights", "30", "--seed", "110", "--each", "1", *with_page)
     told = capsys.readouterr()
-    assert "4 of 30 seeds are flown" in told.err
-    assert "4 of 4 flights in" in told.out
+    assert "2 of 30 seeds are flown" in told.err
+    assert "2 of 2 flights in" in told.out
     text = page.read_text()
-    assert "`make campaign FLIGHTS=30 SEED=110 EACH=2`: " in text
-    assert "Of 30 seeds these are 4 flights: the first 2 of each kind" in text
+    assert "`make campaign FLIGHTS=30 SEED=110 EACH=1`: " in text
+    assert "Of 30 seeds these are 2 flights: the first 1 of each kind" in text
 
 
 def test_bodies_made_by_others_have_a_page_of_their_own(monkeypatch, tmp_path, capsys):
@@ -137,20 +140,18 @@ def fly_on(monkeypatch, tmp_path, flights, seed=SHORT):
 def test_one_that_was_interrupted_goes_on_and_counts_the_same(monkeypatch, tmp_path, capsys):
     for part in ("apart", "whole"):
         (tmp_path / part).mkdir()
-    fly_on(monkeypatch, tmp_path / "apart", 2)
+    fly_on(monkeypatch, tmp_path / "apart", 1)
     assert "continuing" not in capsys.readouterr().err
-    in_two = fly_on(monkeypatch, tmp_path / "apart", 5)
+    in_two = fly_on(monkeypatch, tmp_path / "apart", 3)
     told = capsys.readouterr()
-    assert f"continuing after 2 flights of {tmp_path}" in told.err
-    assert "5 of 5 flights in" in told.out
-    assert in_two == fly_on(monkeypatch, tmp_path / "whole", 5)
-
-
-def test_nothing_is_flown_twice(monkeypatch, tmp_path, capsys):
-    fly_on(monkeypatch, tmp_path, 2)
-    monkeypatch.setattr(flights, "fly_here", None)  # what flies now raises
-    fly_on(monkeypatch, tmp_path, 2)
-    assert "2 of 2 flights in" in capsys.readouterr().out
+    assert f"continuing after 1 flights of {tmp_path}" in told.err
+    assert "3 of 3 flights in" in told.out
+    assert in_two == fly_on(monkeypatch, tmp_path / "whole", 3)
+    # Nothing is flown again: what flies now raises.
+    monkeypatch.setattr(flights, "fly_here", None)
+    capsys.readouterr()
+    fly_on(monkeypatch, tmp_path / "whole", 3)
+    assert "3 of 3 flights in" in capsys.readouterr().out
 
 
 @pytest.fixture(scope="module")
@@ -195,6 +196,9 @@ def test_flights_of_another_campaign_are_not_gone_on_with(
 
 
 def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
     monkeypatch.setattr(campaign.checkpoint, "text_of", full_disk)
     fly_on(monkeypatch, tmp_path, 1)
     told = capsys.readouterr()
@@ -217,11 +221,6 @@ def test_a_file_that_takes_long_to_write_is_written_less_often(monkeypatch, tmp_
         kept.look(flights.Tally())
         now[0] += 1.0
     assert written == [70.0, 270.0, 470.0], "a twentieth of the time"
-
-
-def full_disk(*_):
-    """As writing does then."""
-    raise OSError(28, "No space left on device")
 
 
 @pytest.mark.parametrize("changed", ["profiles/one.yaml", "dsdl/flyfire/163", "telem/57.yaml"])
@@ -284,13 +283,16 @@ def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_p
     assert "   0.000 s  is up" in from_file
 
 
-def test_a_replay_says_who_outlives_the_autopilot(monkeypatch, tmp_path, capsys):
+def test_a_changed_scenario_can_be_flown_and_says_who_outlives_the_autopilot(
+    monkeypatch, tmp_path, capsys
+):
     lost = replace(draw(7), faults=(), failure=Failure.POWER, vehicle="mavlink")
     lost = replace(lost, profile="multirotor", vehicle_sources=("vehicle/state", "odometry"))
     file = tmp_path / "lost.json"
     file.write_text(text_of(lost, "made by hand"))
     run(monkeypatch, "--replay", str(file))
     told = capsys.readouterr().out
+    assert '"faults": []' in told
     assert '"vehicle_sources": [' in told
     assert "and with it the autopilot, outlived by: odometry" in told
 
@@ -311,7 +313,7 @@ def flown_by(out):
 def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
     page = tmp_path / "campaign.md"
     options = ("--jobs", str(jobs), "--page", str(page), "--failures", str(tmp_path))
-    with flying("campaign", *options) as process:
+    with flying("campaign", *options, changed=ONE_BY_ONE) as process:
         first, out, err = interrupted(process)
     assert err.splitlines()[-1] == "campaign: interrupted"
     flown = flown_by(out)
@@ -343,7 +345,7 @@ def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     """As the system does that has no memory left."""
     kept = tmp_path / "kept.json"
     options = ("--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept))
-    with flying("campaign", *options) as process:
+    with flying("campaign", *options, changed=ONE_BY_ONE) as process:
         process.stderr.readline()
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         os.kill(int(children[0]), signal.SIGKILL)
@@ -355,9 +357,17 @@ def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     assert json.loads(kept.read_text())["flights"] == flown_by(out)
 
 
-def test_a_changed_scenario_can_be_flown(monkeypatch, tmp_path, capsys):
-    calm = replace(draw(7), faults=(), gusts=0.0)
-    file = tmp_path / "calm.json"
-    file.write_text(text_of(calm, "made by hand"))
-    run(monkeypatch, "--replay", str(file))
-    assert '"faults": []' in capsys.readouterr().out
+def test_a_plan_tells_hours_and_core_hours_from_the_rate_of_one_core():
+    text = plan(10_000_000, 2.5, 600, None)
+    assert text.startswith("10000000 flights, if each core flies 150 a minute, as in the 600 ")
+    head, _, one, four, *_, last = text.splitlines()[2:]
+    assert head == "| workers, one a core | hours | core hours |"
+    assert one == "| 1 | 1111.1 | 1111 |"
+    assert four == "| 4 | 277.8 | 1111 |"
+    assert last == "| 1024 | 1.1 | 1111 |"
+
+
+def test_a_price_is_only_what_it_is_given():
+    head, _, one, *_ = plan(3600, 1.0, 600, 0.25).splitlines()[2:]
+    assert head.endswith("| cost at 0.25 a core hour |")
+    assert one == "| 1 | 1.0 | 1 | 0.25 |"

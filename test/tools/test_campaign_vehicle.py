@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from command_bench import assert_refused, call
 
+from chute_ros.campaign import heights as needed
 from chute_ros.campaign.cases import Case
 from chute_ros.campaign.heights import CaseFlights
 from chute_ros.campaign.needed_height import Fall, FallStage, Needed
@@ -101,6 +102,12 @@ def test_its_page_and_pictures_go_over_nothing_else(tmp_path, monkeypatch, capsy
 
 
 def test_it_prints_its_tables_and_writes_its_page_and_its_picture(monkeypatch, tmp_path, capsys):
+    # All failures are flown in test/campaign/test_needed_height.py.
+    every = needed.cases
+    few = ("motor lost, level", "power lost, level")
+    monkeypatch.setattr(
+        needed, "cases", lambda *given: [c for c in every(*given) if f"{c.name}, {c.flown}" in few]
+    )
     page = tmp_path / "mine.md"
     options = ("--flights", "1", "--seed", "5", "--jobs", "1", "--page", str(page))
     run(monkeypatch, "--vehicle", DRONE, *options)
