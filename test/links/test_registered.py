@@ -244,7 +244,7 @@ def test_the_defaults_of_a_node_need_no_settings_of_another(tmp_path):
         changed("    package=", '    parameters="other_link.none:Settings", package='),
     )
     tell = (
-        "from chute_ros.tools.chute.defaults import defaults_for as told; "
+        "from chute_ros.tools.chute.parameter_list import defaults_for as told; "
         "from chute_ros.tools.parameter_docs import NODES\n"
         "for node in ('safety_supervisor', 'relay'):\n"
         "    names = [one.name for one in NODES[node]]\n"

@@ -19,6 +19,12 @@ KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
+def answer_of(future: Any) -> ServiceAnswer:
+    """Of a call of one of KINDS that is done."""
+    message = with_plain_texts(future.result())
+    return ServiceAnswer(message.success, message.message, getattr(message, "accepted", None))
+
+
 class OrderCall:
     """One order. Made first, so that its service, and who keeps the record, are found while the
     vehicle is listened to. who: gives it."""
@@ -44,10 +50,7 @@ class OrderCall:
         if not self._session.until(future.done, seconds):
             text = not_answered(self._order, f"within {seconds:g} s")
             raise CommandError(text, {"sent": True, "answered": False})
-        message = with_plain_texts(future.result())
-        answer = ServiceAnswer(
-            message.success, message.message, getattr(message, "accepted", None)
-        )
+        answer = answer_of(future)
         recorded.answered(answer)
         self._record.leave()
         return answer

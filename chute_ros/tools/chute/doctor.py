@@ -6,7 +6,6 @@ import os
 
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import fast_dds
-from chute_ros.tools.chute.box_files import folder_of
 from chute_ros.tools.chute.doctor_computer import (
     disk_finding,
     environment_findings,
@@ -19,6 +18,7 @@ from chute_ros.tools.chute.errors import CommandError
 from chute_ros.tools.chute.finding import WRONG, DoctorFinding, finding_lines, worst_first
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
+from chute_ros.tools.chute.record_text import folder_of
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import getpass
+import os
 import socket
 import sys
+import termios
+from collections.abc import Sequence
 
 from chute_ros.plain_text import plain
 from chute_ros.tools.chute.calling import OrderCall
-from chute_ros.tools.chute.confirmation import ask, require_terminal
+from chute_ros.tools.chute.errors import CommandError, MistakeError
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.options import ANSWER, Chosen
@@ -37,7 +40,7 @@ def main(chosen: Chosen) -> int:
     order = order_of(chosen, who)
     asks = bool(order.word) and not chosen.more.yes
     if asks:
-        require_terminal(order.name)
+        _require_terminal(order.name)
     with opened(chosen.namespace) as session:
         call = OrderCall(session, order, who)
         listening = Listening(session) if asks or order.unreached else None
@@ -73,7 +76,28 @@ def _ask(session: ChuteSession, listening: Listening, order: Order) -> None:
     session.until(listening.view, _SHOWN_WITHIN)
     picture = listening.settle(_SHOWN_WITHIN) if listening.view() else None
     lines = order_lines(session.namespace, picture, order.does)
-    ask(order.name, order.word, [*lines, *filter(None, [warning(order, picture)])])
+    _ask_word(order.name, order.word, [*lines, *filter(None, [warning(order, picture)])])
+
+
+def _require_terminal(name: str) -> None:
+    """MistakeError where nobody can be asked."""
+    if not sys.stdin.isatty():
+        raise MistakeError(f"{name}: no terminal to ask at: nothing was sent; --yes does not ask")
+
+
+def _ask_word(name: str, word: str, told: Sequence[str]) -> None:
+    """Show what is told, on standard error, and wait for the word; CommandError if another is
+    typed."""
+    for line in told:
+        print(line, file=sys.stderr)
+    print(
+        f"type {word} to {name}, anything else to leave it: ", end="", file=sys.stderr, flush=True
+    )
+    # What was typed before the question is no answer to it.
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+    answer = os.read(sys.stdin.fileno(), 1000).decode(errors="replace").strip()
+    if answer != word:
+        raise CommandError(f"{name}: not confirmed, nothing was sent", {"sent": False})
 
 
 def _warn(order: Order, listening: Listening, unheard: bool = True) -> bool:

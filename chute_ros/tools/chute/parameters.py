@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import sys
 
-from chute_ros.tools.chute.defaults import defaults_for
 from chute_ros.tools.chute.gathering import expected
 from chute_ros.tools.chute.hearing import ReceivedMessages
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.listening import Listening
 from chute_ros.tools.chute.node_parameters import nodes, parameters_of_node
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
-from chute_ros.tools.chute.parameter_list import Given, given, parameter_lines
+from chute_ros.tools.chute.parameter_list import Given, defaults_for, given, parameter_lines
 from chute_ros.tools.chute.session import ChuteSession, opened
 
 

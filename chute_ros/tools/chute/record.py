@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 
 from chute_ros.plain_text import plain
-from chute_ros.tools.chute.box_files import newest_files
 from chute_ros.tools.chute.errors import CommandError
 from chute_ros.tools.chute.gathering import gather
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
-from chute_ros.tools.chute.record_text import BLACK_BOX, box_lines, box_of
+from chute_ros.tools.chute.record_text import BLACK_BOX, box_lines, box_of, newest_files
 from chute_ros.tools.chute.session import opened
 
 

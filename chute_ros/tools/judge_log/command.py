@@ -198,7 +198,3 @@ def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
     for t in tried:
         lines.append(f"  sweep: {t.rule}: {t.what} is {t.shipped:g}, {t.words}")
     print("\n".join(map(plain, lines)), flush=True)
-
-
-if __name__ == "__main__":
-    main()

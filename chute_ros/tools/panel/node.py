@@ -23,7 +23,7 @@ from chute_ros.ros import qos
 from chute_ros.ros.parameters import declare, settings_taken
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.settings import settings_from
-from chute_ros.tools.chute.calling import KINDS
+from chute_ros.tools.chute.calling import KINDS, answer_of
 from chute_ros.tools.chute.hearing import ReceivedMessage
 from chute_ros.tools.chute.order import Order, ServiceAnswer
 from chute_ros.tools.chute.session import namespaces
@@ -218,10 +218,7 @@ class PanelNode(Node):
         record = self._record(namespace, service, request, person) if person else None
 
         def answered(future: Any) -> None:
-            message = with_plain_texts(future.result())
-            one = ServiceAnswer(
-                message.success, message.message, getattr(message, "accepted", None)
-            )
+            one = answer_of(future)
             if record is not None:
                 record(one)
             answer.set_result(one)
