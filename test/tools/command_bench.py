@@ -1,4 +1,4 @@
-"""The commands that fly campaigns: called here, or in processes of their own."""
+"""Commands: called here, or in processes of their own."""
 
 from __future__ import annotations
 
@@ -7,10 +7,32 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def ended(command: Iterable[object], **environment: str) -> tuple[int, str, str]:
+    """The exit code, output and errors of a process."""
+    done = subprocess.run(
+        [*map(str, command)],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120.0,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def tool(name: str, *arguments: object, **environment: str) -> tuple[int, str, str]:
+    """The same of a tool."""
+    return ended([sys.executable, "-m", f"chute_ros.tools.{name}", *arguments], **environment)
 
 
 def call(command: ModuleType, monkeypatch, *arguments: str) -> None:

@@ -6,6 +6,7 @@ import threading
 
 import pytest
 from chute_msgs.msg import SafetyState
+from command_bench import tool
 from node_bench import bench  # noqa: F401
 from std_srvs.srv import Trigger
 
@@ -116,12 +117,7 @@ def test_without_its_simulators_each_service_says_who_does_not_run(bench):  # no
 def test_a_vehicle_that_is_none_is_refused(bench):  # noqa: F811
     with pytest.raises(ParameterError, match=r"vehicle of .* is 'car': need one of "):
         bench.add(BenchNode, vehicle="car")
-    done = subprocess.run(
-        [sys.executable, "-m", "chute_ros.tools.sim_bench", "--ros-args", "-p", "vehicle:=car"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
+    code, _, err = tool("sim_bench", "--ros-args", "-p", "vehicle:=car")
+    assert code == 2
+    (line,) = err.splitlines()
     assert line.startswith("sim_bench: parameter vehicle of /sim_bench is 'car': need one of ")

@@ -5,12 +5,22 @@ import shlex
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from command_bench import ROOT, ended, refused
 
-ROOT = Path(__file__).parents[2]
-TOOLS = ["demo", "replay", "report", "to_rosbag2", "campaign", "explore", "chute"]
+from chute_ros.tools import (
+    campaign_command,
+    replay_command,
+    report_command,
+    to_rosbag2_command,
+)
+from chute_ros.tools import (
+    test_card_command as card_command,
+)
+from chute_ros.tools.judge_log import command as judge_log
+
+TOOLS = ["demo", "replay", "report", "to_rosbag2", "campaign", "explore", "chute", "judge_log"]
 #: Stays in the middle of the imports of a tool, once it has said so.
 SLOW = """
 import signal
@@ -103,12 +113,31 @@ def test_while_it_explores():
     assert interrupted(started) == (130, "explore: interrupted\n")
 
 
+#: A tool with a main of the test's own.
+OWN = """
+import sys
+import types
+
+{main}
+
+module = types.ModuleType("chute_ros.tools.own")
+module.main = main
+sys.modules[module.__name__] = module
+from chute_ros.tools import entry
+{before}
+entry.run("{name}", "own")
+"""
+
+
+def own(main, name="own", before=""):
+    """The command of a tool with this main."""
+    return (sys.executable, "-c", OWN.format(main=main, name=name, before=before))
+
+
 #: A Ctrl-C comes, and what was called makes an error of its own of it, or there is none and it
 #: fails all the same.
 BINDING = """
 import signal
-import sys
-import types
 
 
 def main():
@@ -117,31 +146,21 @@ def main():
     except KeyboardInterrupt:
         raise RuntimeError("Unable to convert call argument") from None
     raise RuntimeError("a mistake")
-
-
-module = types.ModuleType("chute_ros.tools.binding")
-module.main = main
-sys.modules[module.__name__] = module
-from chute_ros.tools.entry import run
-run("binding", "binding")
 """
 
 
 def test_in_the_middle_of_a_binding_that_makes_an_error_of_it():
-    code = BINDING.format(number="signal.SIGINT")
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert (done.returncode, done.stderr) == (130, "binding: interrupted\n")
+    code, _, err = ended(own(BINDING.format(number="signal.SIGINT")))
+    assert (code, err) == (130, "own: interrupted\n")
+    code, _, err = ended(own(BINDING.format(number="signal.SIGCONT")))
+    assert code == 1, "of another cause"
+    assert err.endswith("RuntimeError: a mistake\n")
 
 
 #: Something on its way swallows it, as a finaliser does.
 SWALLOWED = """
 import signal
-import sys
 import time
-import types
-
-from chute_ros.tools import entry
 
 
 def main():
@@ -150,30 +169,18 @@ def main():
     except KeyboardInterrupt:
         pass
     time.sleep(600)
-
-
-module = types.ModuleType("chute_ros.tools.swallowing")
-module.main = main
-sys.modules[module.__name__] = module
-entry._CUT_OFF_AFTER = 0.2
-entry.run("chute", "swallowing")
 """
 
 
 def test_one_that_was_swallowed_ends_it_all_the_same():
-    command = [sys.executable, "-c", SWALLOWED]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
-    )
-    assert (done.returncode, done.stderr) == (130, "chute: interrupted\n")
+    command = own(SWALLOWED, "chute", "entry._CUT_OFF_AFTER = 0.2")
+    assert ended(command) == (130, "", "chute: interrupted\n")
 
 
 #: The signal comes while rclpy makes one of its objects, half of which would complain when it is
 #: collected.
 HALF_MADE = """
 import signal
-import sys
-import types
 from pathlib import Path
 
 from rclpy.task import Future
@@ -214,39 +221,29 @@ Future.__init__ = make_slowly
 from chute_ros.tools.chute.screen import full_screen
 from chute_ros.tools.chute.session import opened
 from chute_ros.tools.demo_director import Director
-from chute_ros.tools.entry import run
 from chute_ros.tools.processes import Processes
 
-module = types.ModuleType("chute_ros.tools.half_made")
-module.main = {place}
-sys.modules[module.__name__] = module
-run("half_made", "half_made")
+main = {place}
 """
 
 
 @pytest.mark.parametrize(
     ("place", "number", "code", "told"),
     [
-        ("director", "SIGINT", 130, "half_made: interrupted\n"),
-        ("session", "SIGINT", 130, "half_made: interrupted\n"),
+        ("director", "SIGINT", 130, "own: interrupted\n"),
+        ("session", "SIGINT", 130, "own: interrupted\n"),
         ("session", "SIGTERM", 143, ""),
     ],
 )
 def test_in_the_middle_of_what_rclpy_makes(place, number, code, told):
-    command = [sys.executable, "-c", HALF_MADE.format(place=place, number=number)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
-    )
-    assert (done.returncode, done.stderr) == (code, told)
     # The turn in which it came is the second, and whole.
-    assert done.stdout.count("due\n") == 2
+    command = own(HALF_MADE.format(place=place, number=number))
+    found, out, err = ended(command)
+    assert (found, out.count("due\n"), err) == (code, 2, told)
 
 
 #: rclpy has shut itself down by a signal that Python has not been told of yet.
 SHUT_DOWN = """
-import sys
-import types
-
 import rclpy
 import rclpy.executors
 from std_srvs.srv import Trigger
@@ -258,37 +255,19 @@ def main():
     {ends}
     client.service_is_ready()
     raise RuntimeError("a mistake")
-
-
-module = types.ModuleType("chute_ros.tools.shutting")
-module.main = main
-sys.modules[module.__name__] = module
-from chute_ros.tools.entry import run
-run("shutting", "shutting")
 """
 
 
 @pytest.mark.parametrize(
     ("ends", "code", "told"),
     [
-        ("rclpy.get_default_context().shutdown()", 130, "shutting: interrupted\n"),
+        ("rclpy.get_default_context().shutdown()", 130, "own: interrupted\n"),
         ("pass", 1, "RuntimeError: a mistake\n"),
     ],
 )
 def test_after_rclpy_has_shut_down_by_a_signal(ends, code, told):
-    command = [sys.executable, "-c", SHUT_DOWN.format(ends=ends)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
-    )
-    assert (done.returncode, done.stderr[-len(told) :]) == (code, told)
-
-
-def test_an_error_of_another_cause_is_one():
-    code = BINDING.format(number="signal.SIGCONT")
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert done.returncode == 1
-    assert done.stderr.endswith("RuntimeError: a mistake\n")
+    found, _, err = ended(own(SHUT_DOWN.format(ends=ends)))
+    assert (found, err[-len(told) :]) == (code, told)
 
 
 def test_one_that_is_to_ignore_it_goes_on(recording):
@@ -311,8 +290,6 @@ def test_one_that_is_to_ignore_it_goes_on(recording):
 PRINTS = """
 import contextlib
 import os
-import sys
-import types
 
 
 def main():
@@ -321,33 +298,17 @@ def main():
     print("remark", file=sys.stderr)
     print("result")
     sys.exit(1)
-
-
-module = types.ModuleType("chute_ros.tools.printing")
-module.main = main
-sys.modules[module.__name__] = module
-from chute_ros.tools.entry import run
-run("printing", "printing")
 """
 
 
-def shell(arguments, redirections, command=(sys.executable, "-c", PRINTS)):
+def shell(command, redirections):
     """Its exit code, and what it wrote to standard output and error, where they are open."""
-    line = f"{shlex.join([*command, *arguments])} {redirections}"
-    done = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", line],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
-        timeout=120.0,
-    )
-    return done.returncode, done.stdout, done.stderr
+    return ended(["bash", "-o", "pipefail", "-c", f"{shlex.join(command)} {redirections}"])
 
 
 def test_what_others_write_to_descriptor_1_is_no_result():
     complaint = "the middleware complains\n"
-    assert shell([], "") == (1, "result\n", f"{complaint}remark\n")
+    assert shell(own(PRINTS), "") == (1, "result\n", f"{complaint}remark\n")
 
 
 @pytest.mark.parametrize(
@@ -361,28 +322,27 @@ def test_what_others_write_to_descriptor_1_is_no_result():
     ],
 )
 def test_a_closed_stream_changes_no_result(redirections, out, err):
-    code, told, complained = shell([], redirections)
+    code, told, complained = shell(own(PRINTS), redirections)
     assert (code, told) == (1, out)
     assert complained.endswith(err)
     assert "Traceback" not in complained
 
 
 def test_what_cannot_be_printed_is_no_result():
-    code, _, err = shell([], ">/dev/full")
-    told = "printing: standard output cannot be written: No space left on device\n"
+    code, _, err = shell(own(PRINTS), ">/dev/full")
+    told = "own: standard output cannot be written: No space left on device\n"
     assert (code, err) == (74, f"the middleware complains\nremark\n{told}")
 
 
 def test_a_reader_who_has_seen_enough_is_told_nothing():
-    code, _, err = shell([], "| true")
+    code, _, err = shell(own(PRINTS), "| true")
     assert (code, err) == (141, "the middleware complains\nremark\n")
 
 
-@pytest.mark.parametrize("tool", ["judge_log", "replay", "chute", "campaign"])
-def test_no_tool_takes_it_for_a_result(tool):
-    command = (sys.executable, "-m", f"chute_ros.tools.{tool}")
-    code, _, err = shell(["--help"], ">/dev/full", command)
-    told = f"{tool}: standard output cannot be written: No space left on device\n"
+def test_nor_is_help():
+    command = (sys.executable, "-m", "chute_ros.tools.replay", "--help")
+    code, _, err = shell(command, ">/dev/full")
+    told = "replay: standard output cannot be written: No space left on device\n"
     assert (code, err) == (74, told)
 
 
@@ -390,24 +350,23 @@ def test_no_tool_takes_it_for_a_result(tool):
 
 
 @pytest.mark.parametrize(
-    "line",
+    ("command", "before"),
     [
-        "report fifo",
-        "replay fifo",
-        "test_card fifo",
-        "to_rosbag2 fifo",
-        "judge_log fifo",
-        "campaign --replay fifo",
-        "campaign --flights 1 --resume fifo",
-        "campaign --tapes fifo",
-        "campaign --vehicle fifo",
+        (report_command, ()),
+        (replay_command, ()),
+        (card_command, ()),
+        (to_rosbag2_command, ()),
+        (judge_log, ()),
+        (campaign_command, ("--replay",)),
+        (campaign_command, ("--flights", "1", "--resume")),
+        (campaign_command, ("--tapes",)),
+        (campaign_command, ("--vehicle",)),
     ],
 )
-def test_a_fifo_in_place_of_a_file_is_not_waited_for(line, tmp_path):
-    fifo = tmp_path / "fifo"
-    os.mkfifo(fifo)
-    tool, *arguments = (str(fifo) if one == "fifo" else one for one in line.split())
-    code, _, err = shell(arguments, "", (sys.executable, "-m", f"chute_ros.tools.{tool}"))
-    assert code == 2
-    assert "no regular file but a FIFO" in err
-    assert "Traceback" not in err
+def test_a_fifo_in_place_of_a_file_is_not_waited_for(
+    command, before, tmp_path, monkeypatch, capsys
+):
+    os.mkfifo(tmp_path / "fifo")
+    monkeypatch.chdir(tmp_path)
+    _, errors = refused(command, monkeypatch, capsys, *before, "fifo")
+    assert "no regular file but a FIFO" in errors

@@ -4,56 +4,36 @@ says what to do, and nothing else."""
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from command_bench import tool
 from test_not_built import MISSING
 
 from chute_ros.not_installed import remedy
 
 #: Those that need messages, or links; the others run without.
 NEED_MESSAGES = [
-    "demo",
-    "replay",
-    "report",
-    "test_card",
-    "to_rosbag2",
-    "sim",
-    "judge_log",
-    "chute",
+    *("demo", "replay", "report", "test_card", "to_rosbag2", "sim", "judge_log", "chute"),
 ]
 NEED_LINKS = ["campaign", "compare", "judge_log", "conformance"]
 
 
-def ended(tool: str, first: Path) -> list[str]:
+def told_by(name: str, first: Path) -> list[str]:
     """What it says on stderr; it ends with 2, or as chute tells that it can find nothing out."""
     path = os.pathsep.join([str(first), *filter(None, sys.path)])
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            f"chute_ros.tools.{tool}",
-            "status" if tool == "chute" else "mavlink",
-        ],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
-    assert done.returncode == (1 if tool == "chute" else 2), done.stderr
-    assert done.stdout == ""
-    return done.stderr.splitlines()
+    code, out, err = tool(name, "status" if name == "chute" else "mavlink", PYTHONPATH=path)
+    assert (code, out) == (1 if name == "chute" else 2, ""), err
+    return err.splitlines()
 
 
-@pytest.mark.parametrize("tool", NEED_MESSAGES)
+@pytest.mark.parametrize("name", NEED_MESSAGES)
 def test_where_the_messages_are_not_built_it_says_how_to_build_them(
-    tool: str, tmp_path: Path
+    name: str, tmp_path: Path
 ) -> None:
     (tmp_path / "sitecustomize.py").write_text(MISSING.format(name="chute_msgs"))
-    first, *lines, last = ended(tool, tmp_path)
+    first, *lines, last = told_by(name, tmp_path)
     assert first.endswith(
         "chute_msgs cannot be imported: build both packages and source the result:"
     )
@@ -61,14 +41,14 @@ def test_where_the_messages_are_not_built_it_says_how_to_build_them(
     assert "chute_msgs" in last
 
 
-@pytest.mark.parametrize("tool", NEED_LINKS)
-def test_a_link_whose_package_was_removed_is_named(tool: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", NEED_LINKS)
+def test_a_link_whose_package_was_removed_is_named(name: str, tmp_path: Path) -> None:
     info = tmp_path / "gone-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: gone\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[chute_ros.links]\npyro = gone_package\n")
-    (line,) = ended(tool, tmp_path)
-    assert line.startswith(f"{tool}: ")
+    (line,) = told_by(name, tmp_path)
+    assert line.startswith(f"{name}: ")
     assert "pyro" in line
 
 

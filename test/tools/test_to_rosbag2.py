@@ -1,12 +1,10 @@
 """A black box becomes a folder that another reader of rosbag2 takes, with every message in it."""
 
 import dataclasses
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import yaml
+from command_bench import tool
 from flight_bench import NAMESPACE, WALL, Flight, run
 from rclpy.serialization import deserialize_message
 from rosbags.interfaces import QosDurability, QosReliability
@@ -20,7 +18,6 @@ from chute_ros.tools import to_rosbag2_command as command
 from chute_ros.tools.mcap_entries import McapEntries
 
 pytestmark = pytest.mark.xdist_group("to_rosbag2")
-ROOT = Path(__file__).parents[2]
 HINT = (
     "to_rosbag2: play where no vehicle receives it: a recorded request or heartbeat is one to "
     "every node in the same domain\n"
@@ -288,7 +285,6 @@ def test_files_of_two_versions_of_a_message_are_not_mixed(flown, tmp_path, monke
 
 
 def test_as_a_person_starts_it(flown, tmp_path):
-    begun = [sys.executable, "-m", "chute_ros.tools.to_rosbag2", flown, "--output", tmp_path / "b"]
-    done = subprocess.run(begun, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"{tmp_path / 'b'}\n", HINT)
-    assert read(tmp_path / "b") == recorded(flown)
+    folder = tmp_path / "b"
+    assert tool("to_rosbag2", flown, "--output", folder) == (0, f"{folder}\n", HINT)
+    assert read(folder) == recorded(flown)
