@@ -24,14 +24,6 @@ YAML = """\
 """
 
 
-@pytest.fixture(scope="module")
-def flight(tmp_path_factory):
-    one = Flight(tmp_path_factory.mktemp("flight")).fly()
-    one.land()
-    assert {Action.KILL, Action.DEPLOY} <= set(one.decided())
-    return one
-
-
 @pytest.fixture
 def other(tmp_path):
     """A parameter file with these lines."""
@@ -45,6 +37,7 @@ def other(tmp_path):
 
 
 def test_the_same_settings_give_the_same_decisions(flight, monkeypatch, capsys):
+    assert {Action.KILL, Action.DEPLOY} <= set(flight.decided())
     assert run(replay.main, monkeypatch, flight.folder) == 0
     out = capsys.readouterr().out
     assert f"{round(END / STEP)} turns replayed" in out
@@ -212,7 +205,7 @@ def test_a_mistake_in_the_settings_is_told_in_one_line(
         ("/**/upf_can:\n  ros__parameters: {}\n", "has no ros__parameters for"),
         ("- 1\n", "has no ros__parameters for"),
         ("ros__parameters: {mode: SHADOW}\n", "has no ros__parameters for"),
-        ("[" * 3000, "cannot be read"),
+        pytest.param("[" * 3000, "cannot be read", id="deep"),
         ("a: 2001-12-14t21:59:43.10-99:99", "cannot be read"),
         ("a: &a {b: *a}", "more than 1000 names in it: no parameter file"),
     ],

@@ -62,13 +62,6 @@ class Tags(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def flight(tmp_path_factory):
-    one = Flight(tmp_path_factory.mktemp("flight")).fly()
-    one.land()
-    return one
-
-
-@pytest.fixture(scope="module")
 def page(flight):
     return report.report(flight.files())
 
