@@ -24,16 +24,18 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NoReturn
 
+import rclpy
+from std_srvs.srv import Trigger
+
 from chute_ros.errors import ChuteError
-from chute_ros.interrupts import CtrlC
+from chute_ros.interrupts import CtrlC, in_one_piece
 from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
 from chute_ros.plain_text import plain
-from chute_ros.ros.middleware import RANGE
+from chute_ros.ros.middleware import RANGE, set_up_middleware
 from chute_ros.ros.private_files import open_new
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.bench_call import call_action
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
@@ -50,6 +52,8 @@ from chute_ros.tools.simulated_vehicle import (
 ROCKET = "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
+#: How long a service may take to be offered, and to answer, s.
+_DONE_WITHIN = 10.0
 _PASSWORD = "password"
 #: In what the nodes keep.
 _BLACK_BOX = Path("chute_ros/black_box")
@@ -59,6 +63,10 @@ _LISTENS = "panel at http"
 
 class RunsAlreadyError(ChuteError):
     """A vehicle runs in this namespace."""
+
+
+class NotDoneError(ChuteError):
+    """An action was not done; the text says why."""
 
 
 def main() -> None:
@@ -73,7 +81,7 @@ def main() -> None:
         _refuse(mistake)
     if chosen.do:
         try:
-            print(call_action(chosen.namespace, chosen.do))
+            print(_done(chosen.namespace, chosen.do))
         except ChuteError as error:
             sys.exit(f"sim: {chosen.do}: {error}")
         return
@@ -97,6 +105,32 @@ def main() -> None:
                 signal.signal(number, signal.SIG_IGN)
             processes.end()
             _tell_kept(processes.ros_home)
+
+
+def _done(namespace: str, name: str) -> str:
+    """What the action of this name of a vehicle that runs has done, in words. NotDoneError: it is
+    not done."""
+    set_up_middleware()
+    rclpy.init(args=[])
+    node = rclpy.create_node(f"sim_{secrets.token_hex(4)}", namespace=namespace)
+    try:
+        client = node.create_client(Trigger, f"sim/{name}")
+        if not client.wait_for_service(_DONE_WITHIN):
+            raise NotDoneError(
+                f"{namespace}/sim/{name} is not offered within {_DONE_WITHIN:g} s: start a "
+                "vehicle that has it (make sim) in the same ROS domain"
+            )
+        answer = client.call_async(Trigger.Request())
+        with in_one_piece():
+            rclpy.spin_until_future_complete(node, answer, timeout_sec=_DONE_WITHIN)
+        if not answer.done():
+            raise NotDoneError(f"no answer within {_DONE_WITHIN:g} s")
+        if not answer.result().success:
+            raise NotDoneError(answer.result().message)
+        return str(answer.result().message)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def _options() -> argparse.ArgumentParser:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
-import sys
 
 import pytest
 from chute_bench import AtTerminal
+from command_bench import tool
 from panel_bench import (
     PATIENCE,
     PHONE,
@@ -17,7 +16,6 @@ from panel_bench import (
     fits,
     hold,
     log_in,
-    password_file,
     picture,
     terminal_picture,
     terminal_rows,
@@ -68,18 +66,12 @@ def opened(rig, panel, open_page):
     return page
 
 
-def opened_late(page, open_page):
-    """The same page, in the browser of somebody who comes now."""
-    return open_page(page.url)
-
-
 def answered(page, text):
     """Wait until an answer to an order is shown."""
     expect(page.locator(".answers")).to_contain_text(text, timeout=PATIENCE)
 
 
-def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path):
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+def test_a_whole_flight_on_a_phone(rig, pilot, panel, open_page):
     # Given a vehicle whose parachute is missing, when somebody looks, then it says why.
     page = open_page(f"{panel.address}/vehicle{rig.namespace}", PHONE, has_touch=True)
     word(page, "BLOCKED")
@@ -124,9 +116,8 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
     assert set(words[3:]) <= {"KILLING", "DEPLOYING", "DEPLOYED"}
     # When the operator resets, then it is not released any more, and the record has who did it.
     page.get_by_text("more orders").click()
-    for _ in range(
-        3
-    ):  # a page that a busy machine cut off says so, and that it is to be held again
+    # A page that a busy machine cut off says so, and that it is to be held again.
+    for _ in range(3):
         hold(page, "Reset")
         answered(page, "reset: ")
         if "safety/reset: " in panel.log():
@@ -137,8 +128,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path)
 
 
 @pytest.mark.long
-def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, start_panel, open_page, tmp_path):
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, panel, open_page):
     # Given a page that waits for its vehicle, when that starts, then it is seen from its start on.
     page = open_page(f"{panel.address}/vehicle{hangar.namespace}", PHONE, has_touch=True)
     expect(page.locator("body")).to_contain_text("No supervisor is found", timeout=PATIENCE)
@@ -213,16 +203,13 @@ def test_a_vehicle_whose_parachutes_are_lost_in_flight_is_not_guarded(
     page.goto(f"{panel.address}/fleet")
     card = page.locator(f'a[href="/vehicle{rig.namespace}"]')
     expect(card).to_contain_text("IN FLIGHT, NOT GUARDED", timeout=PATIENCE)
-    status = ("--namespace", rig.namespace, "status", "--json")
-    command = [sys.executable, "-m", "chute_ros.tools.chute", *status]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
-    told = json.loads(done.stdout)
-    assert (done.returncode, told["well"], told["unguarded"]) == (1, False, True)
+    code, out, _ = tool("chute", "--namespace", rig.namespace, "status", "--json")
+    told = json.loads(out)
+    assert (code, told["well"], told["unguarded"]) == (1, False, True)
     assert any("no parachute can be reached" in one for one in told["alarms"])
 
 
-def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_path, await_until):
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+def test_a_kill_and_a_deploy_by_hand(rig, pilot, panel, open_page):
     page = opened(rig, panel, open_page)
     log_in(page)
     word(page, "READY")
@@ -263,8 +250,7 @@ def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_pat
 
 @pytest.mark.long
 @pytest.mark.parametrize("hangar", ["both"], indirect=True)
-def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_path):
-    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+def test_a_flight_with_two_parachutes(rig, pilot, panel, open_page):
     page = opened(rig, panel, open_page)
     log_in(page)
     word(page, "READY")
@@ -296,7 +282,7 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     picture(page, "two_parachutes.jpg", whole=True)
     expect(vehicle).to_contain_text("ON_GROUND", timeout=PATIENCE)
     # Whoever opens the page now finds the kill and the deploy with their reasons.
-    late = opened_late(page, open_page)
+    late = open_page(page.url)
     decisions = late.locator(".part-decisions")
     for text in ("KILL by rule", "DEPLOY by rule", "kill confirmed after"):
         expect(decisions).to_contain_text(text, timeout=PATIENCE)
@@ -313,9 +299,7 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     terminal_picture(late, terminal.shown, "chute_watch.jpg")
 
 
-def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(
-    rig, start_panel, open_page, await_until
-):
+def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(rig, start_panel, open_page):
     panel = start_panel()
     page = opened(rig, panel, open_page)
     word(page, "READY")

@@ -151,11 +151,12 @@ class Flight:
         self.box.message("safety/state", message)
 
 
-def run(main: Any, monkeypatch: Any, *arguments: object) -> int:
-    """Call the main function of a tool as from the command line; its exit code."""
+def run(main: Any, monkeypatch: Any, *arguments: object) -> Any:
+    """Call the main function of a tool as from the command line; its exit code, or what it says
+    with code 1."""
     monkeypatch.setattr("sys.argv", ["tool", *map(str, arguments)])
     try:
         main()
     except SystemExit as end:
-        return int(end.code or 0)
+        return end.code or 0
     return 0

@@ -7,11 +7,13 @@ import shutil
 import socket
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 from command_bench import flying, interrupted
 from dask_bench import dask_bench
+from flight_bench import run as run_main
 
 import chute_ros
 from chute_ros.campaign import campaign as flights
@@ -23,6 +25,7 @@ from chute_ros.tools import campaign_cluster, campaign_command
 #: Of short flights.
 SEEDS, BUNDLE = range(117, 125), 2
 PACKAGE = Path(chute_ros.__file__).parent
+run = partial(run_main, campaign_command.main)
 # The cluster and the flights of one process are for all.
 pytestmark = pytest.mark.xdist_group("campaign_cluster")
 
@@ -94,16 +97,6 @@ def kept(tally):
     """All that is counted and measured, to the last digit, but the time that it took."""
     tally.took = 0.0
     return text_of(tally, SEEDS[0], "")
-
-
-def run(monkeypatch, *arguments):
-    """The command; its exit code."""
-    monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
-    try:
-        campaign_command.main()
-    except SystemExit as ended:
-        return ended.code
-    return 0
 
 
 def transitions(flown):

@@ -13,6 +13,7 @@ import threading
 
 import pytest
 from chute_bench import COMMAND, ROOT
+from command_bench import tool
 from rocket_operator import commands_to
 
 from chute_ros.tools.demo_rig import DemoRig
@@ -87,16 +88,7 @@ class Terminal:
 
     def chute(self, *arguments):
         """(exit code, standard output, standard error) of one command."""
-        done = subprocess.run(
-            [*COMMAND, "--namespace", self._namespace, *arguments],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            check=False,
-            cwd=ROOT,
-        )
-        return done.returncode, done.stdout, done.stderr
+        return tool("chute", "--namespace", self._namespace, *arguments)
 
     def orders(self, *arguments):
         """One that must be done; what it answered."""

@@ -10,6 +10,10 @@ import subprocess
 import sys
 
 import pytest
+from command_bench import refused
+from flight_bench import run
+
+from chute_ros.tools import demo_command, replay_command
 
 
 def start(*arguments):
@@ -55,6 +59,12 @@ def runs(tmp_path_factory):
     return run
 
 
+def assert_in_this_order(story, out):
+    places = [out.find(step) for step in story]
+    assert -1 not in places, out
+    assert places == sorted(places), out
+
+
 def test_it_passes_from_the_block_to_the_touchdown(runs):
     code, out, err, _ = runs("good")
     assert code == 0, out + err
@@ -71,10 +81,8 @@ def test_it_passes_from_the_block_to_the_touchdown(runs):
         "TOUCHDOWN",
         "DEMO PASSED",
     ]
-    places = [out.find(step) for step in story]
-    assert -1 not in places, out
+    assert_in_this_order(story, out)
     assert "FLIGHT_BLOCK_RELEASE" in out
-    assert places == sorted(places), "in this order"
 
 
 def test_its_summary_has_the_kill_before_the_release(runs):
@@ -112,9 +120,7 @@ def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
         "CANOPY OPEN",
         "DEMO PASSED",
     ]
-    places = [out.find(step) for step in story]
-    assert -1 not in places, out
-    assert places == sorted(places), "in this order"
+    assert_in_this_order(story, out)
     log = (folder / "upf.log").read_text()
     assert log.index("TYPE_KILLSWITCH answered: SUCCESS") < log.index("FIRED by")
 
@@ -149,9 +155,7 @@ def test_a_rocket_flies_to_its_landing_under_the_canopies_that_were_called_for(r
         "LANDED at",
         "DEMO PASSED",
     ]
-    places = [out.find(step) for step in story]
-    assert -1 not in places, out
-    assert places == sorted(places), "in this order"
+    assert_in_this_order(story, out)
     logs = {file.name: file.read_text() for file in folder.glob("*.log")}
     assert set(logs) == {f"{n}.log" for n in ("supervisor", "umbilical", "rocket")}
     assert logs["rocket.log"].index("command <V>") < logs["rocket.log"].index("command <D>")
@@ -170,16 +174,10 @@ def test_a_rocket_that_takes_no_command_does_not_fly(runs):
 @pytest.mark.parametrize(
     "name", ["good", "both", "rocket", pytest.param("upf", marks=pytest.mark.long)]
 )
-def test_its_recording_decides_the_same_once_more(runs, name):
-    recordings = [str(file) for file in (runs(name)[3] / "ros_home").rglob("*.mcap")]
+def test_its_recording_decides_the_same_once_more(runs, name, monkeypatch):
+    recordings = [*(runs(name)[3] / "ros_home").rglob("*.mcap")]
     assert recordings
-    done = subprocess.run(
-        [sys.executable, "-m", "chute_ros.tools.replay", *recordings],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert run(replay_command.main, monkeypatch, *recordings) == 0
 
 
 def test_where_a_step_cannot_happen_it_fails_loudly(runs):
@@ -200,25 +198,20 @@ def test_ctrl_c_in_the_middle_ends_it_in_one_line():
     assert (child.returncode, err.strip()) == (130, "demo: interrupted"), out + err
 
 
-def test_a_fault_that_is_none_is_refused():
-    done = subprocess.run(
-        [sys.executable, "-m", "chute_ros.tools.demo", "--fault", "everything"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert "parachute-silent" in done.stderr
+def test_a_fault_that_is_none_is_refused(monkeypatch, capsys):
+    _, errors = refused(demo_command, monkeypatch, capsys, "--fault", "everything")
+    assert "parachute-silent" in errors
 
 
 @pytest.mark.parametrize("name", ["/proc/x", "/proc", "file", "file/below"])
-def test_a_folder_for_the_logs_that_cannot_be_is_told_in_one_line(name, tmp_path):
+def test_a_folder_for_the_logs_that_cannot_be_is_told_in_one_line(
+    name, tmp_path, monkeypatch, capsys
+):
     """Not even root can write below /proc."""
     (tmp_path / "file").write_text("notes")
     folder = tmp_path / name
-    child = start("--logs", str(folder))
-    out, err = child.communicate(timeout=60.0)
-    assert (child.returncode, out) == (2, ""), err
+    out, err = refused(demo_command, monkeypatch, capsys, "--logs", str(folder))
+    assert out == ""
     assert err.startswith(f"demo: --logs {folder}: ")
     assert err.endswith(": name a folder to write in\n")
     assert err.count("\n") == 1

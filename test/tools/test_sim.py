@@ -4,16 +4,18 @@ import os
 import re
 import signal
 import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 from chute_msgs.msg import ParachuteStatus, SafetyDecision, SafetyState, VehicleState
+from command_bench import refused, tool
 from node_bench import bench  # noqa: F401
 from printing_process import PrintingProcess
 from std_srvs.srv import Trigger
 
 from chute_ros.ros import qos
+from chute_ros.tools import simulation
 
 PAGE = (Path(__file__).parents[2] / "docs/guide/simulation.md").read_text()
 TUTORIAL = (Path(__file__).parents[2] / "docs/guide/tutorial.md").read_text()
@@ -196,12 +198,11 @@ def test_the_tutorial_is_flown_by_services_alone_as_it_is_told(start, bench):  #
     assert box == begun
     assert Path(box).stat().st_mode & 0o777 == 0o700
     assert "\nreport FOLDER " in TUTORIAL
-    report = [sys.executable, "-m", "chute_ros.tools.report", box]
-    done = subprocess.run(report, capture_output=True, text=True, timeout=120.0, check=False)
-    assert done.returncode == 0, done.stderr
+    code, out, err = tool("report", box)
+    assert code == 0, err
     # A machine that is busy takes so long that its progress is told.
-    assert all(line.startswith("replaying: ") for line in done.stderr.splitlines())
-    page = Path(done.stdout.strip()).read_text()
+    assert all(line.startswith("replaying: ") for line in err.splitlines())
+    page = Path(out.strip()).read_text()
     assert "DEPLOY" in page
     assert "free fall" in page
 
@@ -266,20 +267,11 @@ def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace
     assert not Path(folder).exists()
 
 
-def run(*arguments, **around):
-    done = subprocess.run(
-        [sys.executable, "-m", "chute_ros.tools.sim", *arguments],
-        env={**os.environ, **around},
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+run = partial(tool, "sim")
 
 
-def test_do_prints_what_is_done_or_why_not(start, bench):  # noqa: F811
-    start()
+def test_do_prints_what_is_done_and_a_process_that_ends_by_itself_ends_all(start, bench):  # noqa: F811
+    simulation = start()
     namespace = ("--namespace", bench.namespace)
     code, out, err = run(*namespace, "--do", "refuse_to_open")
     assert (code, err) == (0, "")
@@ -287,14 +279,10 @@ def test_do_prints_what_is_done_or_why_not(start, bench):  # noqa: F811
     code, out, err = run(*namespace, "--do", "launch")
     assert (code, out) == (1, "")
     assert f"sim: launch: {bench.namespace}/sim/launch is not offered within 10 s: start" in err
-    simulation = start()
-    code, errors = simulation.end()
+    code, errors = start().end()
     assert code == 1
     assert f"sim: a vehicle runs in {bench.namespace} already: end it, or give this" in errors
-
-
-def test_a_process_that_ends_by_itself_ends_all_with_its_last_words(start, bench):  # noqa: F811
-    simulation = start()
+    # When a simulator is killed, then its last words are told.
     children = simulation.children()
     (autopilot,) = [
         pid for pid, words in children.items() if b"chute_ros.sim.sim_autopilot" in words
@@ -319,9 +307,9 @@ def test_a_process_that_ends_by_itself_ends_all_with_its_last_words(start, bench
         (("--do", "explode"), "invalid choice: 'explode'"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(arguments, said):
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
+def test_a_mistake_is_told_in_one_line(arguments, said, monkeypatch, capsys):
+    out, err = refused(simulation, monkeypatch, capsys, *arguments)
+    assert out == ""
     assert said in err.splitlines()[-1]
 
 
