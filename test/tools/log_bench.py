@@ -20,6 +20,9 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.ros.message_definitions import definition
 from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.tools.judge_log import command, formats
+from chute_ros.tools.judge_log.flight_log import FlightLog
+from chute_ros.tools.judge_log.log_flight import JudgedLog
 
 ROOT = Path(__file__).parents[2]
 #: Messages that are recorded, and every how many us.
@@ -70,6 +73,20 @@ def flown(script: list[tuple[float, str]], until: float) -> list[Told]:
             for one in decoder.feed_datagram(frame, now):
                 told.append(Told(now, one.message, frame))
     return told
+
+
+def judged(path: Path, profile: str | None = None) -> JudgedLog:
+    """As the command judges this log."""
+    log = formats.read(path, {})
+    return command.flown(log, command.config_of(log, profile))
+
+
+def times_of(log: FlightLog) -> dict[str, list[float]]:
+    """Kind of a message -> when each of them was told, s."""
+    times: dict[str, list[float]] = {}
+    for at, message in log.messages:
+        times.setdefault(message.get_type(), []).append(at)
+    return times
 
 
 # -- telemetry --------------------------------------------------------------------------------

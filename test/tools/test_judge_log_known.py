@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from command_bench import assert_refused
-from log_bench import FAILS, FAILS_AT, FALLS_FROM, LANDED_AT, LANDS, flown, tlog
+from log_bench import FAILS_AT, FALLS_FROM, judged, tlog
 
 from chute_ros.errors import ChuteError
-from chute_ros.tools.judge_log import command, formats
+from chute_ros.tools.judge_log import command
 from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
@@ -17,43 +17,33 @@ from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, pag
 HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
 
 
-def judged(path: Path) -> LogVerdict:
-    log = formats.read(path, {})
-    return verdict_of(command.flown(log, command.config_of(log, None)))
+@pytest.fixture(scope="module")
+def well(landed, tmp_path_factory) -> LogVerdict:
+    return verdict_of(judged(tlog(landed, tmp_path_factory.mktemp("logs") / "well.tlog")))
 
 
 @pytest.fixture(scope="module")
-def landed(tmp_path_factory) -> LogVerdict:
-    return judged(tlog(flown(LANDS, LANDED_AT), tmp_path_factory.mktemp("logs") / "well.tlog"))
-
-
-@pytest.fixture(scope="module")
-def fallen(tmp_path_factory) -> LogVerdict:
-    told = flown(FAILS, FAILS_AT + 4.0)
-    return judged(tlog(told, tmp_path_factory.mktemp("logs") / "fell.tlog"))
+def fell(fallen, tmp_path_factory) -> LogVerdict:
+    return verdict_of(judged(tlog(fallen, tmp_path_factory.mktemp("logs") / "fell.tlog")))
 
 
 def known(right: str, begin: float = 0.0, end: float = 0.0) -> Known:
     return Known("", "", True, "", right, begin, end)
 
 
-def test_an_end_is_right_from_the_failure_on_until_it_is_too_late(landed, fallen):
-    at = fallen.first
-    assert mistake(known("ends", at - 1.0, at + 1.0), fallen) == ""
-    assert mistake(known("ends", at + 0.5, at + 1.0), fallen).startswith(
-        f"ended at {at:.1f} s, be"
-    )
-    assert mistake(known("ends", at - 2.0, at - 0.5), fallen).endswith(
-        f"later than {at - 0.5:g} s"
-    )
-    assert mistake(known("ends", 1.0, 2.0), landed) == "not ended"
-    assert mistake(known(FLIES), landed) == ""
-    assert mistake(known(FLIES), fallen) == f"ended at {at:.1f} s, and nothing asked for it"
-    assert mistake(known("either", at + 0.5), fallen).startswith(f"ended at {at:.1f} s, before")
-    assert mistake(known("either"), landed) == mistake(known("either"), fallen) == ""
+def test_an_end_is_right_from_the_failure_on_until_it_is_too_late(well, fell):
+    at = fell.first
+    assert mistake(known("ends", at - 1.0, at + 1.0), fell) == ""
+    assert mistake(known("ends", at + 0.5, at + 1.0), fell).startswith(f"ended at {at:.1f} s, be")
+    assert mistake(known("ends", at - 2.0, at - 0.5), fell).endswith(f"later than {at - 0.5:g} s")
+    assert mistake(known("ends", 1.0, 2.0), well) == "not ended"
+    assert mistake(known(FLIES), well) == ""
+    assert mistake(known(FLIES), fell) == f"ended at {at:.1f} s, and nothing asked for it"
+    assert mistake(known("either", at + 0.5), fell).startswith(f"ended at {at:.1f} s, before")
+    assert mistake(known("either"), well) == mistake(known("either"), fell) == ""
 
 
-def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp_path):
+def test_the_table_has_what_happened_beside_what_was_decided(well, fell, tmp_path):
     lines = [
         HEAD,
         "well.tlog\tsome/repo: a|b.tlog\tyes\tit takes off and lands\tflies\t\t",
@@ -63,7 +53,7 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
     tsv = tmp_path / "known.tsv"
     tsv.write_text("\n".join(lines) + "\n")
     unread = [(Path("none.bin"), LogError("none.bin: it is empty"))]
-    text = page([landed, fallen], unread, known_of(tsv))
+    text = page([well, fell], unread, known_of(tsv))
     assert "2 logs, 1 of them of real vehicles" in text
     assert "1 were ended, 0 wrongly" in text
     assert "| well.tlog | it takes off and lands |" in text
@@ -75,10 +65,10 @@ def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp
 
 
 def test_a_log_of_which_nothing_is_known_is_told_before_any_is_judged(
-    tmp_path, monkeypatch, capsys
+    landed, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    tlog(flown(LANDS, 3.0), tmp_path / "begun.tlog")
+    tlog(landed, tmp_path / "begun.tlog")
     (tmp_path / "known.tsv").write_text(f"{HEAD}\nother.tlog\ty\tyes\tz\tflies\t\t\n")
     arguments = ("begun.tlog", "--known", "known.tsv")
     words = "--known has no line for begun.tlog"
