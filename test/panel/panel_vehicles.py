@@ -97,13 +97,9 @@ def until(fly, condition, page):
     pytest.fail(f"not in time; the page shows: {page.locator('body').inner_text()}")
 
 
-def open_vehicle(fly, panel, open_page, namespace, size=None):
-    """Its page, from the fleet's."""
-    address = f"{panel.address}/fleet"
-    page = open_page(address, size) if size else open_page(address)
-    link = page.locator(f'a[href="/vehicle{namespace}"]')
-    until(fly, link.count, page)
-    link.click()
+def open_vehicle(fly, panel, open_page, namespace):
+    """Its page, as soon as the panel has found it."""
+    page = open_page(f"{panel.address}/vehicle{namespace}")
     until(fly, page.locator(".part-banner .word").count, page)
     return page
 

@@ -6,14 +6,14 @@ import itertools
 import json
 import re
 import signal
-import subprocess
 import sys
 import threading
 
 import pytest
-from chute_bench import COMMAND, CONTROL, ROOT, AtTerminal, Command, run, run_together
+from chute_bench import CONTROL, AtTerminal, Command, run, run_together
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, PersonRequest, SafetyState
 from chute_msgs.srv import Kill
+from command_bench import ended, tool
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from node_bench import bench, stamped  # noqa: F401
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -140,14 +140,6 @@ def test_where_nothing_is_heard_it_says_where_it_looked_and_what_there_is(ready)
     assert told["error"].startswith("no supervisor is received")
 
 
-def test_nodes_without_a_supervisor_are_named(bench):  # noqa: F811
-    scene = Scene(bench)
-    bench.remove(scene.supervisor)
-    code, _, err = run(bench, "status", "--timeout", "5")
-    assert code == 1
-    assert "; nodes there: mavlink_parachute; " in err
-
-
 # arm, disarm, mode, reset
 
 
@@ -173,11 +165,11 @@ def test_arm_and_disarm_by_the_supervisor(ready):
 def test_who_ordered_it_and_what_came_of_it_is_on_the_record(ready):
     """Given orders that have no reason, in which its giver could stand."""
     heard = ready.bench.follow(PersonRequest, "safety/person")
-    for succeeds, ended, said in ((True, 0, "arm: done: "), (False, 1, "arm: NOT DONE: ")):
+    for succeeds, expected, said in ((True, 0, "arm: done: "), (False, 1, "arm: NOT DONE: ")):
         heard.clear()
         ready.link.arm_succeeds = succeeds
         code, out, _ = run(ready.bench, "arm")
-        assert code == ended
+        assert code == expected
         assert out.startswith(said)
         assert "as told" in out
         ready.bench.until(lambda: any(one.answered for one in heard), "the answer is recorded")
@@ -189,9 +181,15 @@ def test_who_ordered_it_and_what_came_of_it_is_on_the_record(ready):
         assert told.header.stamp == heard[0].header.stamp
 
 
-def test_by_a_device_node_past_the_supervisor(ready):
+def test_without_a_supervisor_its_nodes_are_named_and_one_takes_the_order_itself(ready):
     ready.bench.remove(ready.supervisor)
-    code, out, err = run(ready.bench, "arm", "--timeout", "5")
+    status, arm = run_together(
+        ready.bench, ("status", "--timeout", "5"), ("arm", "--timeout", "5")
+    )
+    code, _, err = status
+    assert code == 1
+    assert "; nodes there: mavlink_parachute; " in err
+    code, out, err = arm
     assert (code, out) == (1, "")
     assert err.endswith("; mavlink_parachute takes the order itself: --link mavlink_parachute\n")
     code, out, _ = run(ready.bench, "arm", "--link", "mavlink_parachute")
@@ -215,12 +213,10 @@ def test_reset_after_a_kill(ready):
     ready.await_stage(SafetyState.READY)
 
 
-def test_an_order_is_sent_whatever_stream_is_closed(ready):
-    for closed in ("<&-", ">&-", "2>&-", "<&- >&- 2>&-"):
-        code, _, err = run(ready.bench, "arm", redirected=closed)
-        assert (code, err) == (0, ""), closed
-        assert ready.link.arm_requests == [(True, 0)], closed
-        ready.link.arm_requests.clear()
+def test_an_order_is_sent_though_every_stream_is_closed(ready):
+    code, _, err = run(ready.bench, "arm", redirected="<&- >&- 2>&-")
+    assert (code, err, ready.link.arm_requests) == (0, "", [(True, 0)])
+    ready.link.arm_requests.clear()
     # Where its answer cannot be printed, standard error tells it.
     code, _, err = run(ready.bench, "arm", redirected=">/dev/full")
     assert (code, ready.link.arm_requests) == (74, [(True, 0)])
@@ -359,17 +355,16 @@ def silent(bench):  # noqa: F811
 
 
 def test_without_an_answer_it_says_that_nobody_knows(bench, silent):  # noqa: F811
-    code, out, err = run(bench, "kill", "--yes", "--timeout", "5")
-    assert (code, out, len(silent)) == (1, "", 1)
+    order = ("kill", "--yes", "--timeout", "5")
+    as_text, as_json = run_together(bench, order, (*order, "--json"))
+    code, out, err = as_text
+    assert (code, out, len(silent)) == (1, "", 2)
     assert err.startswith("chute: kill: safety/kill did not answer within 5 s: it is NOT known ")
-
-
-def test_the_same_as_json_and_by_ctrl_c(bench, silent):  # noqa: F811
-    _, out, _ = run(bench, "kill", "--yes", "--json", "--timeout", "5")
-    told = json.loads(out)
+    told = json.loads(as_json[1])
     assert (told["sent"], told["answered"]) == (True, False)
+    # The same after a Ctrl-C.
     command = Command("--namespace", bench.namespace, "kill", "--yes")
-    bench.until(lambda: len(silent) == 2, "the kill is received")
+    bench.until(lambda: len(silent) == 3, "the kill is received")
     command.process.send_signal(signal.SIGINT)
     bench.until(lambda: command.process.poll() is not None, "it ends")
     code, _, err = command.ended()
@@ -627,8 +622,9 @@ def test_no_control_character_reaches_the_terminal(ready):
         )
     ]
     client.create_timer(0.1, lambda: [send() for send in senders])
-    for command in ("status", "diagnostics", "parameters"):
-        code, out, err = run(ready.bench, command)
+    commands = [("status",), ("diagnostics",), ("parameters",)]
+    told = run_together(ready.bench, *commands)
+    for command, (code, out, err) in zip(commands, told, strict=True):
         assert "evil" in out, (command, code, out, err)
         assert CONTROL.findall(out + err) == []
 
@@ -641,15 +637,9 @@ def test_a_reader_that_has_seen_enough(ready):
 
 
 def test_a_mistake_is_told_without_ros():
-    done = subprocess.run(
-        [*COMMAND, "arm", "--link", "no name"],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "Traceback" not in done.stderr
+    code, out, err = tool("chute", "arm", "--link", "no name")
+    assert (code, out) == (2, "")
+    assert "Traceback" not in err
 
 
 @pytest.mark.parametrize(
@@ -664,12 +654,9 @@ def test_a_mistake_is_told_without_ros():
 )
 def test_an_environment_that_cannot_be_is_a_mistake(monkeypatch, variable, given):
     monkeypatch.setenv(variable, given)
-    done = subprocess.run(
-        [*COMMAND, "status"], capture_output=True, text=True, cwd=ROOT, check=False
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith(f"chute: {variable} is {given!r}: need ")
-    assert done.stderr.count("\n") == 1
+    code, out, err = tool("chute", "status")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"chute: {variable} is {given!r}: need ")
 
 
 # doctor
@@ -715,17 +702,14 @@ def test_the_doctor_where_nothing_is_received(bench):  # noqa: F811
     assert " -> start the vehicle with the same ROS_DOMAIN_ID" in first
 
 
-def test_the_doctor_without_chute_msgs_and_in_a_domain_that_cannot_be(tmp_path, monkeypatch):
+def test_the_doctor_without_chute_msgs_and_in_a_domain_that_cannot_be(tmp_path):
     (tmp_path / "chute_msgs.py").write_text("raise ImportError('gone', name='chute_msgs')\n")
-    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'doctor']\n"
-    code += "from chute_ros.tools.chute.__main__ import main; main()"
+    script = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'doctor']\n"
+    script += "from chute_ros.tools.chute.__main__ import main; main()"
     for domain, told in (
         ("1", "WRONG  cannot be imported: gone -> "),
         ("one", "WRONG  ROS_DOMAIN_ID is 'one'"),
     ):
-        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-        )
-        assert (done.returncode, done.stderr) == (1, "")
-        assert done.stdout.startswith(told)
+        code, out, err = ended([sys.executable, "-c", script], ROS_DOMAIN_ID=domain)
+        assert (code, err) == (1, "")
+        assert out.startswith(told)
