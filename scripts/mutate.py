@@ -24,7 +24,7 @@ PAGE = ROOT / "docs" / "evidence" / "mutation.md"
 #: Module -> the tests that were written for it.
 TESTS = {
     "gate": ("gate", "wrong_heights", "gate_word_for_word"),
-    "machine": ("machine", "machine_written_twice"),
+    "machine": ("machine",),
     "counter": ("counter", "counter_to_last_sample"),
     "lease": ("lease", "lease_every_field"),
     "conditions/base": ("conditions", "conditions_own"),
@@ -122,7 +122,6 @@ TESTS = {
     "preflight": ("preflight", "preflight_word_for_word"),
     "profile_reader": ("profile_reader", "profile_absurd", "profile_mistakes_in_full"),
     "profile_limits": ("profile_absurd",),
-    "profile_lines": ("profile_reader", "profile_mistakes_in_full"),
     "yaml_lines": ("profile_reader", "profile_absurd", "yaml_mistakes_in_full"),
     "rules": ("profile_reader", "profiles", "conditions", "rules_by_themselves"),
     "clock_steps": ("clock_steps",),

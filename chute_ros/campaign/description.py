@@ -15,8 +15,7 @@ from chute_ros.campaign.scenario import PROFILES, flown_vehicles, is_rocket
 from chute_ros.errors import ProfileError
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.sim.autopilot_kinds import ARDUCOPTER, ARDUPLANE, GENERIC, PX4
-from chute_ros.supervisor.profile_lines import ProfileLines
-from chute_ros.supervisor.yaml_lines import Where, compose
+from chute_ros.supervisor.yaml_lines import ProfileLines, Where, compose
 from chute_ros.transport.regular_file import read_regular_text
 
 KINDS = PROFILES[:2]

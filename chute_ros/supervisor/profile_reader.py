@@ -28,9 +28,8 @@ from chute_ros.supervisor.profile_limits import (
     bounds,
     rule_problem,
 )
-from chute_ros.supervisor.profile_lines import ProfileLines
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
-from chute_ros.supervisor.yaml_lines import Where, compose
+from chute_ros.supervisor.yaml_lines import ProfileLines, Where, compose
 
 #: What a rule may want. ALARM: it is only said.
 _ACTIONS = {
@@ -47,6 +46,13 @@ _PROFILE_KEYS = (
     *("profile", "vehicle", "minimum_height", "below_minimum", "low_height", "moving_speed"),
     *("landed_hold", "measurements", "rules"),
 )
+#: What a profile may set to a number: its least and its most.
+_NUMBERS = {
+    "minimum_height": (0.0, HIGHEST_MINIMUM),
+    "low_height": (0.0, HIGHEST_MINIMUM),
+    "landed_hold": (0.0, 60.0),
+    "moving_speed": (0.1, FASTEST_STANDING),
+}
 
 
 def read_profile(text: str, name: str, links: Sequence[str]) -> Profile:
@@ -66,40 +72,26 @@ def _profile(reader: ProfileLines, where: Where) -> Profile:
     for key in ("profile", "rules"):
         if key not in entries:
             reader.wrong(where.line, f"{key} is missing: a profile needs its name and its rules")
-    profile = Profile(name="", rules=())
+    known: dict[str, Any] = {"name": "", "rules": ()}
     if "profile" in entries:
-        profile = replace(profile, name=reader.text(entries["profile"], "profile"))
+        known["name"] = reader.text(entries["profile"], "profile")
     if "vehicle" in entries:
-        word = reader.choice(entries["vehicle"], "vehicle", [one.value for one in Airframe])
-        profile = replace(profile, vehicle=Airframe(word))
-    if "minimum_height" in entries:
-        height = reader.number(entries["minimum_height"], "minimum_height", 0.0, HIGHEST_MINIMUM)
-        profile = replace(profile, minimum_height=height)
-    if "low_height" in entries:
-        height = reader.number(entries["low_height"], "low_height", 0.0, HIGHEST_MINIMUM)
-        profile = replace(profile, low_height=height)
-    if "landed_hold" in entries:
-        hold = reader.number(entries["landed_hold"], "landed_hold", 0.0, 60.0)
-        profile = replace(profile, landed_hold=hold)
-    if "moving_speed" in entries:
-        speed = reader.number(entries["moving_speed"], "moving_speed", 0.1, FASTEST_STANDING)
-        profile = replace(profile, moving_speed=speed)
+        known["vehicle"] = reader.member(entries["vehicle"], "vehicle", Airframe)
+    for key, (least, most) in _NUMBERS.items():
+        if key in entries:
+            known[key] = reader.number(entries[key], key, least, most)
     if "below_minimum" in entries:
-        word = reader.choice(
-            entries["below_minimum"], "below_minimum", [one.value for one in BelowMinimum]
-        )
-        profile = replace(profile, below_minimum=BelowMinimum(word))
+        word = reader.member(entries["below_minimum"], "below_minimum", BelowMinimum)
+        known["below_minimum"] = word
     if "measurements" in entries:
-        reader.limits = _limits(reader, entries["measurements"])
-        profile = replace(profile, limits=reader.limits)
-    rules = []
+        known["limits"] = reader.limits = _limits(reader, entries["measurements"])
     if "rules" in entries:
-        for name, one in reader.mapping(entries["rules"], (), "rules").items():
-            rules.append(_rule(reader, name, one))
+        rules = reader.mapping(entries["rules"], (), "rules")
+        known["rules"] = tuple([_rule(reader, name, one) for name, one in rules.items()])
         if entries["rules"].is_mapping and not rules:
             text = "rules is empty: need at least one; the profile by_hand decides nothing itself"
             reader.wrong(entries["rules"].line, text)
-    return replace(profile, rules=tuple(rules))
+    return Profile(**known)
 
 
 def _limits(reader: ProfileLines, where: Where) -> MappingProxyType[str, Limits]:

@@ -1,17 +1,23 @@
-"""Values of a YAML file with their lines, and what is wrong with them in words."""
+"""Values of a profile's YAML with their lines, and what is wrong with them in words."""
 
 from __future__ import annotations
 
 import difflib
+import enum
 import math
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import yaml
 
 from chute_ros.errors import ProfileError
 from chute_ros.plain_yaml import misread
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+
+#: Instead of a link's name: it is enough if one is so, or all must be.
+ANY, ALL = "any", "all"
+_Kind = TypeVar("_Kind", bound=enum.Enum)
 
 
 class Where:
@@ -26,13 +32,15 @@ class Where:
         return isinstance(self.node, yaml.MappingNode)
 
 
-class LineReader:
+class ProfileLines:
     """Reads values that must be of some kind; collects the mistakes, so that all are told at once.
-    name: of the file."""
+    name: of the file; links: the names of those that are followed."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, links: Sequence[str]) -> None:
+        self.name, self._links = name, links
         self.mistakes: list[str] = []
+        #: Of the measurements of this profile.
+        self.limits: Mapping[str, Limits] = STANDARD_LIMITS
 
     def wrong(self, line: int, text: str) -> None:
         """One more mistake."""
@@ -97,6 +105,14 @@ class LineReader:
         fix = f" (did you mean {near[0]}?)" if near else ""
         self.wrong(where.line, f"{what} is {where.value!r}: need {' or '.join(choices)}{fix}")
         return choices[0]
+
+    def link(self, where: Where, what: str, besides: tuple[str, ...]) -> str:
+        """The name of a link that the supervisor follows."""
+        return self.choice(where, what, (*besides, *self._links))
+
+    def member(self, where: Where, what: str, kind: type[_Kind]) -> _Kind:
+        """The member of an enumeration whose value is written."""
+        return kind(self.choice(where, what, [one.value for one in kind]))
 
     def text(self, where: Where, what: str) -> str:
         """Words."""

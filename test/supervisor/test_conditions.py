@@ -20,10 +20,10 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.pending import ASK_LASTS
-from chute_ros.supervisor.profile_lines import ALL, ANY
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import HeardHere, State
+from chute_ros.supervisor.yaml_lines import ALL, ANY
 
 
 class Told(NamedTuple):
@@ -63,16 +63,14 @@ def look(story: Story, condition: Condition) -> Told:
         (-3.0, 3.0, -3.0, False, "vertical_speed -3.00 (above -3 and below 3)"),
     ],
 )
-def test_a_measurement_holds_beyond_its_limit_not_at_it(
-    above: float, below: float, value: float, holds: bool, words: str
-) -> None:
+def test_a_measurement_holds_beyond_its_limit_not_at_it(above, below, value, holds, words):
     story = Story()
     story.at(0.0, vehicle(vertical_speed=value))
     found = look(story, MeasurementCondition("vertical_speed", above, below))
     assert found == Told(holds, words, samples=1)
 
 
-def test_what_cannot_be_used_says_nothing_about_the_vehicle() -> None:
+def test_what_cannot_be_used_says_nothing_about_the_vehicle():
     story = Story()
     story.at(0.0)
     assert look(story, SINKS).holds is None
@@ -89,7 +87,7 @@ def test_what_cannot_be_used_says_nothing_about_the_vehicle() -> None:
 LOST = (LinkJudgement.LOST,)
 
 
-def test_a_link_that_is_still_starting_is_not_held_against_it() -> None:
+def test_a_link_that_is_still_starting_is_not_held_against_it():
     story = Story(TWO)
     story.at(5.0, story.heartbeat(LINK))
     never = LinkCondition(ANY, (LinkJudgement.NEVER_SEEN,))
@@ -106,13 +104,13 @@ def autopilot(story: Story, fact: AutopilotFact) -> Told:
     return look(story, AutopilotCondition(fact))
 
 
-def test_an_autopilot_that_was_never_heard_is_not_lost() -> None:
+def test_an_autopilot_that_was_never_heard_is_not_lost():
     story = Story()
     story.at(60.0)
     assert autopilot(story, AutopilotFact.LOST) == Told(None, "vehicle/state never received")
 
 
-def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None:
+def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so():
     story = Story()
     story.at(0.0, vehicle(link_state=LinkState.OK))
     story.at(2.5)
@@ -125,7 +123,7 @@ def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None
     assert autopilot(story, AutopilotFact.LOST).holds is True
 
 
-def test_an_autopilot_that_says_disarmed_must_say_so_freshly() -> None:
+def test_an_autopilot_that_says_disarmed_must_say_so_freshly():
     story = Story()
     story.at(0.0, vehicle(armed=Armed.DISARMED))
     assert autopilot(story, AutopilotFact.DISARMED) == Told(True, "autopilot says DISARMED")
@@ -136,9 +134,7 @@ def test_an_autopilot_that_says_disarmed_must_say_so_freshly() -> None:
 @pytest.mark.parametrize(
     ("status", "holds"), [(0, False), (4, False), (5, False), (6, True), (7, False), (8, True)]
 )
-def test_an_autopilot_that_terminates_says_so_and_counts_up_to_its_age(
-    status: int, holds: bool
-) -> None:
+def test_an_autopilot_that_terminates_says_so_and_counts_up_to_its_age(status, holds):
     story = Story()
     story.at(0.0, vehicle(system_status=status))
     for t in (0.0, 2.5):
@@ -150,7 +146,7 @@ def test_an_autopilot_that_terminates_says_so_and_counts_up_to_its_age(
     assert autopilot(story, AutopilotFact.EMERGENCY) == old
 
 
-def test_an_autopilot_that_restarts_counts_in_flight_only() -> None:
+def test_an_autopilot_that_restarts_counts_in_flight_only():
     story = Story().ready()
     story.at(0.1, story.told(armed=Armed.DISARMED, reboot_count=1, rebooted_in_flight=True))
     assert autopilot(story, AutopilotFact.REBOOTED).holds is False
@@ -169,7 +165,7 @@ def device(story: Story, fact: DeviceFact, link: str = ANY) -> Told:
     return look(story, DeviceCondition(fact, link))
 
 
-def test_a_device_that_asks_for_a_kill_wants_it_for_a_second() -> None:
+def test_a_device_that_asks_for_a_kill_wants_it_for_a_second():
     story = Story(TWO)
     story.at(0.0, i.KillRequest(0, "upf_can 33", "about to launch"))
     found = device(story, DeviceFact.ASKS_FOR_KILL)
@@ -186,7 +182,7 @@ def test_a_device_that_asks_for_a_kill_wants_it_for_a_second() -> None:
         assert device(story, DeviceFact.ASKS_FOR_KILL).holds is holds
 
 
-def test_parachutes_that_are_out_are_named_with_their_link() -> None:
+def test_parachutes_that_are_out_are_named_with_their_link():
     story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).flying()
     assert device(story, DeviceFact.DEPLOYED) == Told(False, "no parachute is out")
     out = [parachute("upf_can", name, deployed=True) for name in ("33", "34")]
@@ -196,7 +192,7 @@ def test_parachutes_that_are_out_are_named_with_their_link() -> None:
     assert not device(story, DeviceFact.DEPLOYED, LINK).holds
 
 
-def test_a_device_that_is_abnormal_says_why() -> None:
+def test_a_device_that_is_abnormal_says_why():
     story = Story(TWO)
     broken = ParachuteStatus("33", LinkState.OK, ParachuteState.ABNORMAL, faults=("POD", "IMU"))
     silent = ParachuteStatus("34", LinkState.OK, ParachuteState.ABNORMAL)
@@ -225,7 +221,7 @@ def test_a_device_that_is_abnormal_says_why() -> None:
         (SINKS, False),
     ],
 )
-def test_what_tells_only_that_somebody_is_not_heard(condition: Condition, silence: bool) -> None:
+def test_what_tells_only_that_somebody_is_not_heard(condition, silence):
     assert condition.is_silence is silence
 
 
@@ -247,9 +243,7 @@ HEAVY = MeasurementCondition("height", above=500.0, weight=2.0)
         ({"height": 501.0, "tilt": 61.0, "acceleration": 1.0}, True),
     ],
 )
-def test_the_weights_of_those_that_hold_must_reach_what_is_needed(
-    told: dict[str, float], fires: bool
-) -> None:
+def test_the_weights_of_those_that_hold_must_reach_what_is_needed(told, fires):
     story = Story(with_rules(rule(TILT, FALLS, HEAVY, needed=2.0))).flying()
     story.fly(0.2, **{"height": 499.0, **told})
     assert bool(story.fired()) is fires
@@ -274,7 +268,7 @@ def heard(ago: float, *devices: ParachuteStatus) -> LinkEvidence:
     return LinkEvidence(heard=NOW - ago, reported=LinkState.OK, devices=told)
 
 
-def test_only_those_that_hold_are_told_as_reasons_and_what_cannot_be_said_does_not() -> None:
+def test_only_those_that_hold_are_told_as_reasons_and_what_cannot_be_said_does_not():
     story = Story(with_rules(rule(TILT, FALLS, HEAVY, needed=2.0, hold=0.1))).flying()
     story.fly(0.3, tilt=61.0, acceleration=math.nan)
     assert story.fired() == []
@@ -289,14 +283,14 @@ def test_only_those_that_hold_are_told_as_reasons_and_what_cannot_be_said_does_n
 # -- at their limits -----------------------------------------------------------------------------
 
 
-def test_samples_that_cannot_be_used_were_seen_all_the_same() -> None:
+def test_samples_that_cannot_be_used_were_seen_all_the_same():
     old = Measured(value=70.0, measured_at=NOW - 9.0, same_since=NOW - 9.0, count=4)
     known = state(measurements=MappingProxyType({"tilt_deg": old}))
     found = told(CONFIG, known, MeasurementCondition("tilt_deg", above=60.0), NOW)
     assert (found.holds, found.samples) == (None, 4)
 
 
-def test_every_link_is_told_with_what_was_asked_for_and_judged_by_its_own_limits() -> None:
+def test_every_link_is_told_with_what_was_asked_for_and_judged_by_its_own_limits():
     known = state(links=links(a=heard(0.2), b=heard(5.0)))
     text = (
         "link a is OK, last received 0.20 s ago, b is LOST, last received 5.00 s ago "
@@ -314,14 +308,14 @@ def test_every_link_is_told_with_what_was_asked_for_and_judged_by_its_own_limits
     assert told(patient, known, LinkCondition(ANY, SILENT), NOW).holds is False
 
 
-def test_one_that_is_still_starting_does_not_hide_the_next() -> None:
+def test_one_that_is_still_starting_does_not_hide_the_next():
     known = State(epoch=7, started_at=NOW - 1.0, heard=HeardHere(links=links(b=heard(5.0))))
     found = told(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
     assert found.holds is True
     assert found.text.startswith("link a is still starting, b is LOST")
 
 
-def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> None:
+def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link():
     wrong = [
         ParachuteStatus("1", LinkState.OK, ParachuteState.ABNORMAL, faults=("hot",)),
         ParachuteStatus("2", LinkState.OK, ParachuteState.ABNORMAL),
@@ -334,7 +328,7 @@ def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> 
     assert told(CONFIG, known, abnormal, NOW) == Told(False, "no device is ABNORMAL")
 
 
-def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
+def test_a_speed_that_is_told_by_the_heights_has_their_samples():
     height = Measured(value=30.0, measured_at=NOW, same_since=NOW, count=7)
     known = state(
         measurements=MappingProxyType({"height": height}), heights=((NOW - 1.0, 50.0), (NOW, 30.0))
@@ -351,9 +345,7 @@ def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
         (50.0, -4.0, False, "(minimum 50 m), and something reports whether it falls"),
     ],
 )
-def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(
-    minimum: float, speed: float, holds: bool, words: str
-) -> None:
+def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(minimum, speed, holds, words):
     config = SupervisorConfig(profile=Profile("tested", (), minimum_height=minimum))
     told_speed = {} if math.isnan(speed) else {"vertical_speed": Measured(speed, NOW, NOW, 1)}
     known = state(
@@ -380,23 +372,21 @@ OWN: dict[str, Any] = {
 }
 
 
-def test_one_that_says_all_of_itself_can_be_made() -> None:
+def test_one_that_says_all_of_itself_can_be_made():
     made = type("Whole", (Condition,), OWN)()
     assert made.counted
     assert [made.measured, made.rests_on_the_vehicle, made.goes_on] == [(), False, False]
 
 
 @pytest.mark.parametrize("missing", OWN)
-def test_one_that_forgets_something_cannot_be_made(missing: str) -> None:
+def test_one_that_forgets_something_cannot_be_made(missing):
     kind = type("Half", (Condition,), {key: OWN[key] for key in OWN if key != missing})
     with pytest.raises(TypeError, match=missing):
         kind()
 
 
 @pytest.mark.parametrize(("key", "kind"), CONDITIONS.items())
-def test_every_kind_is_read_under_its_key_and_kept_in_the_black_box(
-    key: str, kind: type[Condition]
-) -> None:
+def test_every_kind_is_read_under_its_key_and_kept_in_the_black_box(key, kind):
     assert kind.key == key
     assert is_dataclass(kind)
     assert {"weight"} <= {one.name for one in fields(kind)}
@@ -404,7 +394,7 @@ def test_every_kind_is_read_under_its_key_and_kept_in_the_black_box(
 
 
 @pytest.mark.parametrize("fact", AutopilotFact)
-def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact: AutopilotFact) -> None:
+def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact):
     story, one = Story().flying(), AutopilotCondition(fact)
     now = START + story.t
     assert one.find(story.config, story.state, now).text
@@ -412,7 +402,7 @@ def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact: AutopilotFact
     assert received in one.deadlines(story.config, story.state, None, False, now)
 
 
-def test_the_end_of_a_wish_is_waited_for_by_the_rule_that_looks_at_it() -> None:
+def test_the_end_of_a_wish_is_waited_for_by_the_rule_that_looks_at_it():
     asked = DeviceCondition(DeviceFact.ASKS_FOR_KILL)
     story = Story(with_rules()).flying()
     story.at(1.0, i.KillRequest(0, "upf_can 33", "smoke"))

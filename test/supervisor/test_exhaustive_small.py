@@ -1,7 +1,5 @@
 """Every sequence of a small alphabet of inputs: what must hold holds after each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -15,8 +13,8 @@ from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.profile_lines import ANY
 from chute_ros.supervisor.rules import DEVICE_RULES, BelowMinimum
+from chute_ros.supervisor.yaml_lines import ANY
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"
@@ -119,20 +117,20 @@ def every_sequence(watch: Watch, letters: dict[str, Letter], depth: int, told: s
 @pytest.mark.parametrize(
     ("number", "depth"), [(0, 3), (1, 3), (2, 3), pytest.param(2, 4, marks=pytest.mark.long)]
 )
-def test_every_sequence_of_ten_inputs(number: int, depth: int) -> None:
+def test_every_sequence_of_ten_inputs(number, depth):
     name, watch = list(beginnings())[number]
     assert every_sequence(watch, LETTERS, depth, name) == sum(10**n for n in range(1, depth + 1))
 
 
 @pytest.mark.parametrize("number", range(3))
-def test_every_sequence_of_all_inputs_to_a_depth_of_two(number: int) -> None:
+def test_every_sequence_of_all_inputs_to_a_depth_of_two(number):
     name, watch = list(beginnings())[number]
     depth = 2
     assert every_sequence(watch, MORE, depth, name) == sum(21**n for n in range(1, depth + 1))
 
 
 @pytest.mark.parametrize("depth", [4, pytest.param(5, marks=pytest.mark.long)])
-def test_every_sequence_of_the_ladder(depth: int) -> None:
+def test_every_sequence_of_the_ladder(depth):
     names = ("kill confirmed", "deploy failed", "trigger failed", "deploy confirmed", "silence")
     watch = Watch(CONFIG)
     for letter in ("stands", "flies", "person"):
@@ -144,7 +142,7 @@ def test_every_sequence_of_the_ladder(depth: int) -> None:
 
 
 @pytest.mark.parametrize("before", ["stands", "flies", "silence"])
-def test_on_the_ground_no_sequence_without_a_person_fires_anything(before: str) -> None:
+def test_on_the_ground_no_sequence_without_a_person_fires_anything(before):
     down = {"armed": Armed.DISARMED, "landed_state": GROUND}
     on_ground = {
         "stands": LETTERS["stands"],
@@ -174,7 +172,7 @@ def test_on_the_ground_no_sequence_without_a_person_fires_anything(before: str) 
     assert every_sequence(watch, letters, 4, before) == 780
 
 
-def test_whatever_came_before_one_that_falls_in_flight_is_killed_at_once() -> None:
+def test_whatever_came_before_one_that_falls_in_flight_is_killed_at_once():
     """Every two letters before; then it falls in earnest."""
     for first in MORE.values():
         for second in MORE.values():
@@ -192,7 +190,7 @@ def test_whatever_came_before_one_that_falls_in_flight_is_killed_at_once() -> No
             assert watch.state.stage in (Stage.DEPLOYING, Stage.DEPLOYED)
 
 
-def test_a_fall_of_any_length_in_any_phase_of_the_update_is_one_kill_and_one_deploy() -> None:
+def test_a_fall_of_any_length_in_any_phase_of_the_update_is_one_kill_and_one_deploy():
     for every in (0.01, 0.05, 0.1, 0.2):
         for silent_after in (5, 12, 40):
             story = Story(CONFIG).flying()

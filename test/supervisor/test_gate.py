@@ -31,9 +31,9 @@ from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.pending import Pending
-from chute_ros.supervisor.profile_lines import ANY
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.yaml_lines import ANY
 
 K, D = Action.KILL, Action.DEPLOY
 
@@ -48,7 +48,7 @@ def asked(story: Story, force: bool = False, token: int = 5) -> str:
 # -- a person ------------------------------------------------------------------------------------
 
 
-def test_in_flight_a_person_is_never_refused() -> None:
+def test_in_flight_a_person_is_never_refused():
     story = Story().flying()
     assert asked(story) == ""
     assert story.state.stage is Stage.KILLING
@@ -63,7 +63,7 @@ def test_in_flight_a_person_is_never_refused() -> None:
 
 
 @pytest.mark.parametrize("told", [{"tilt": 0.0}, {"armed": Armed.DISARMED}, {"height": 2.0}])
-def test_no_measurement_refuses_a_person_in_flight(told: dict[str, Any]) -> None:
+def test_no_measurement_refuses_a_person_in_flight(told):
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING}
     story = Story(with_rules(profile=profile)).flying()
     story.fly(0.5, **told)
@@ -72,7 +72,7 @@ def test_no_measurement_refuses_a_person_in_flight(told: dict[str, Any]) -> None
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_person_is_never_slower_than_a_rule() -> None:
+def test_a_person_is_never_slower_than_a_rule():
     by_rule = Story(with_rules(rule(SINKS))).flying()
     by_rule.fly(0.1, every=0.1, vertical_speed=-14.0)
     by_person = Story(with_rules(rule(SINKS))).flying()
@@ -84,7 +84,7 @@ def test_a_person_is_never_slower_than_a_rule() -> None:
     assert by_person.when(D) <= by_rule.when(D)
 
 
-def test_a_person_and_a_rule_at_once_are_one_deploy() -> None:
+def test_a_person_and_a_rule_at_once_are_one_deploy():
     story = Story(with_rules(rule(SINKS))).flying()
     story.at(0.1, i.DeployRequest(5, False, "it falls"), story.told(vertical_speed=-14.0))
     story.at(0.7)
@@ -92,7 +92,7 @@ def test_a_person_and_a_rule_at_once_are_one_deploy() -> None:
     assert story.newest(D).rule == "operator"
 
 
-def test_a_kill_is_refused_to_nobody_in_any_stage() -> None:
+def test_a_kill_is_refused_to_nobody_in_any_stage():
     for stage in Stage:
         story = Story()
         story.state = type(story.state)(epoch=7, started_at=1000.0, stage=stage)
@@ -119,7 +119,7 @@ def denied(story: Story, why: str) -> None:
 
 
 @pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
-def test_a_rule_never_deploys_on_the_ground(armed: Armed) -> None:
+def test_a_rule_never_deploys_on_the_ground(armed):
     story = wants()
     story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
     story.fly(20.0, vertical_speed=-14.0, landed_state=LandedState.ON_GROUND, armed=armed)
@@ -149,8 +149,8 @@ LIES: dict[str, Any] = {"tilt": 90.0, "vertical_speed": 0.0}
     ],
 )
 def test_a_rule_does_not_deploy_one_that_lies_on_the_ground_after_its_flight_or_a_kill(
-    killed: str | None, told: dict[str, Any], why: str
-) -> None:
+    killed, told, why
+):
     story = wants(conditions=(TILTS,), profile={} if killed else {"landed_hold": 1.0})
     story = story.ready() if killed == "on the ground" else story.flying()
     if killed:
@@ -164,20 +164,20 @@ def test_a_rule_does_not_deploy_one_that_lies_on_the_ground_after_its_flight_or_
 @pytest.mark.parametrize(
     "lie", [{"armed": Armed.DISARMED}, {"landed_state": LandedState.ON_GROUND}]
 )
-def test_one_that_falls_is_deployed_whatever_it_says(lie: dict[str, Any]) -> None:
+def test_one_that_falls_is_deployed_whatever_it_says(lie):
     story = wants(profile={"landed_hold": 1.0}).flying().fly(0.2, vertical_speed=-14.0, **lie)
     assert story.fired() == ["KILL"]
     assert story.fly(0.7, vertical_speed=-14.0, **lie).fired() == ["KILL", "DEPLOY"]
 
 
-def test_the_disarming_by_our_own_kill_does_not_stop_the_deploy() -> None:
+def test_the_disarming_by_our_own_kill_does_not_stop_the_deploy():
     story = wants(conditions=(TILTS,)).flying().fly(0.1, tilt=90.0)
     story.fly(0.2, **LIES, **OFF)
     story.at(0.25, story.report(K, Outcome.CONFIRMED))
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_after_a_kill_in_flight_a_rule_still_deploys_although_the_motors_are_off() -> None:
+def test_after_a_kill_in_flight_a_rule_still_deploys_although_the_motors_are_off():
     story = wants().flying()
     story.at(0.1, i.KillRequest(1, "operator", "stop"))
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
@@ -188,7 +188,7 @@ def test_after_a_kill_in_flight_a_rule_still_deploys_although_the_motors_are_off
 @pytest.mark.parametrize(
     "silence", [LinkCondition(ANY, (LinkJudgement.LOST,)), AutopilotCondition(AutopilotFact.LOST)]
 )
-def test_silence_alone_never_deploys_whatever_the_profile_says(silence: Any) -> None:
+def test_silence_alone_never_deploys_whatever_the_profile_says(silence):
     story = wants(conditions=(silence,)).flying()
     story.at(60.0)
     assert story.fired() == []
@@ -204,9 +204,7 @@ def test_silence_alone_never_deploys_whatever_the_profile_says(silence: Any) -> 
         (9.0, 1.0, {"vertical_speed": -11.0, "link_state": LinkState.LOST}),
     ],
 )
-def test_silence_and_a_sign_of_falling_deploy_and_neither_alone(
-    weight: float, needed: float, before: dict[str, Any]
-) -> None:
+def test_silence_and_a_sign_of_falling_deploy_and_neither_alone(weight, needed, before):
     lost = AutopilotCondition(AutopilotFact.LOST, weight=weight)
     story = wants(conditions=(lost, SINKS), needed=needed).flying().fly(1.0, **before)
     assert story.fired() == []
@@ -222,9 +220,7 @@ def test_silence_and_a_sign_of_falling_deploy_and_neither_alone(
         (BelowMinimum.DEPLOY, ["KILL", "DEPLOY"]),
     ],
 )
-def test_below_the_minimum_height_only_what_the_profile_allows(
-    allowed: BelowMinimum, fired: list[str]
-) -> None:
+def test_below_the_minimum_height_only_what_the_profile_allows(allowed, fired):
     story = wants(profile={"minimum_height": 10.0, "below_minimum": allowed}).flying()
     story.fly(1.0, vertical_speed=-14.0, height=9.9)
     assert story.fired() == fired
@@ -236,7 +232,7 @@ def test_below_the_minimum_height_only_what_the_profile_allows(
 
 
 @pytest.mark.parametrize("allowed", BelowMinimum)
-def test_at_the_minimum_height_and_where_it_is_not_known_it_deploys(allowed: BelowMinimum) -> None:
+def test_at_the_minimum_height_and_where_it_is_not_known_it_deploys(allowed):
     profile = {"minimum_height": 10.0, "below_minimum": allowed}
     story = wants(profile=profile).flying().fly(1.0, vertical_speed=-14.0, height=10.0)
     assert story.fired() == ["KILL", "DEPLOY"]
@@ -245,14 +241,14 @@ def test_at_the_minimum_height_and_where_it_is_not_known_it_deploys(allowed: Bel
     assert story.fly(6.2, vertical_speed=-14.0, height=math.nan).fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_vehicle_that_tips_over_before_it_was_ever_high_is_only_killed() -> None:
+def test_a_vehicle_that_tips_over_before_it_was_ever_high_is_only_killed():
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
     story = wants(profile=profile).flying().fly(1.0, vertical_speed=-14.0, height=math.nan)
     assert story.fired() == ["KILL"]
     assert "never seen at the minimum height, 10 m" in "; ".join(story.newest(K).reasons)
 
 
-def test_a_denial_is_said_once_not_at_each_update_and_again_when_its_reason_changes() -> None:
+def test_a_denial_is_said_once_not_at_each_update_and_again_when_its_reason_changes():
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING, "landed_hold": 3.0}
     story = wants(conditions=(TILTS,), profile=profile).flying()
     for n in range(20):
@@ -262,14 +258,14 @@ def test_a_denial_is_said_once_not_at_each_update_and_again_when_its_reason_chan
     assert story.said().count("wants a deploy") == 2
 
 
-def test_what_was_denied_is_not_done_with_and_deploys_once_it_may() -> None:
+def test_what_was_denied_is_not_done_with_and_deploys_once_it_may():
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING}
     story = wants(profile=profile).flying().fly(0.5, vertical_speed=-14.0, height=9.0)
     assert story.fired() == []
     assert story.fly(0.6, vertical_speed=-14.0, height=11.0).fired() == ["KILL"]
 
 
-def test_the_links_that_a_deploy_needs_are_no_reason_against_it() -> None:
+def test_the_links_that_a_deploy_needs_are_no_reason_against_it():
     story = Story(SupervisorConfig()).flying()
     story.at(30.0)
     assert (
@@ -296,7 +292,7 @@ def flying(**told: Any) -> Story:
 # -- every word ----------------------------------------------------------------------------------
 
 
-def test_a_person_hears_why_once_a_parachute_is_out() -> None:
+def test_a_person_hears_why_once_a_parachute_is_out():
     story = flying()
     story.at(0.7, parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
@@ -311,7 +307,7 @@ def test_a_person_hears_why_once_a_parachute_is_out() -> None:
     assert gate.against_person(two, story.state, True, now) == "", "the second is not"
 
 
-def test_a_person_hears_that_nothing_says_where_it_is() -> None:
+def test_a_person_hears_that_nothing_says_where_it_is():
     config, state = SupervisorConfig(), State(epoch=7, started_at=0.0)
     assert gate.against_person(config, state, False, 1.0) == (
         "the vehicle is STARTUP, not in flight (nothing fresh says whether it is in the air); "
@@ -320,7 +316,7 @@ def test_a_person_hears_that_nothing_says_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("stage", [one for one in Stage if one is not Stage.DEPLOYED])
-def test_a_person_needs_no_force_in_flight_and_everywhere_else(stage: Stage) -> None:
+def test_a_person_needs_no_force_in_flight_and_everywhere_else(stage):
     config, state = SupervisorConfig(), State(epoch=7, started_at=0.0, stage=stage)
     flies = stage in (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
     assert (gate.against_person(config, state, False, 1.0) == "") is flies
@@ -331,7 +327,7 @@ def against(config: SupervisorConfig, state: State, findings: tuple[Finding, ...
     return gate.against_rule(config, state, RULE, findings, state.own.updated_at)
 
 
-def test_only_a_kill_in_this_flight_excuses_motors_that_are_off_and_not_for_long() -> None:
+def test_only_a_kill_in_this_flight_excuses_motors_that_are_off_and_not_for_long():
     state, config = flying(armed=Armed.DISARMED).state, with_rules()
     off = "the motors are disarmed, and nothing says that it falls"
     now = state.own.updated_at
@@ -348,7 +344,7 @@ def test_only_a_kill_in_this_flight_excuses_motors_that_are_off_and_not_for_long
         against(config, state, (HOLDS, HOLDS))
 
 
-def test_one_that_was_killed_in_flight_and_has_come_down_is_not_deployed() -> None:
+def test_one_that_was_killed_in_flight_and_has_come_down_is_not_deployed():
     story = flying()
     assert against(story.config, story.state, (HOLDS,)) == ""
     story.at(0.65, story.heartbeat())
@@ -386,15 +382,13 @@ def seen(**deployed: bool) -> State:
         ({"d1": False}, "trigger", False),
     ],
 )
-def test_a_step_is_out_if_all_that_it_means_are(
-    deployed: dict[str, bool], device: str, out: bool
-) -> None:
+def test_a_step_is_out_if_all_that_it_means_are(deployed, device, out):
     state = seen(**deployed)
     assert gate.out_already(state, Rung("upf_can", device)) is out
     assert not gate.out_already(state, Rung(LINK, device)), "the other link has said nothing"
 
 
-def test_a_step_whose_node_confirmed_is_out_and_no_other() -> None:
+def test_a_step_whose_node_confirmed_is_out_and_no_other():
     decision = Decision(7, 1, Action.DEPLOY, "r", (), ("upf_can",), device="2")
     sent = Pending(decision, ("upf_can",), 0.0, 0.0)
     told = MappingProxyType({"upf_can": frozenset({Outcome.CONFIRMED})})
@@ -420,7 +414,7 @@ def test_a_step_whose_node_confirmed_is_out_and_no_other() -> None:
         (20.0, 0.0, False, ""),
     ],
 )
-def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, why: str) -> None:
+def test_too_low_to_the_last_bit(height, minimum, was_high, why):
     story = Story(with_rules())
     story.noise = -1  # none
     story.at(0.1, story.told(height=height, link_state=LinkState.OK))
@@ -435,7 +429,7 @@ def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, 
     assert gate.too_low(replace(config, profile=anywhere), state, state.own.updated_at) == ""
 
 
-def test_one_that_flies_from_a_ground_below_home_is_deployed() -> None:
+def test_one_that_flies_from_a_ground_below_home_is_deployed():
     """Given one that landed 20 m below home, was armed there and flies 28 m above that ground."""
     story = Story(shipped("multirotor")).ready().fly(5.0, height=20.0)
     for step in range(270):
@@ -458,7 +452,7 @@ def held_back(height: Measured, **flight: float) -> bool:
     return bool(gate.too_low(SupervisorConfig(profile=profile), state, 1000.0))
 
 
-def test_what_is_low_above_home_may_be_high_above_the_ground_of_this_flight() -> None:
+def test_what_is_low_above_home_may_be_high_above_the_ground_of_this_flight():
     for armed, took_off, height, low in (
         (-20.0, -19.0, 8.9, False),
         (-20.0, -10.0, -0.1, True),
@@ -477,7 +471,7 @@ def test_what_is_low_above_home_may_be_high_above_the_ground_of_this_flight() ->
         assert held_back(measured, **flight) is low, (armed, took_off, height)
 
 
-def test_a_height_that_jumped_down_holds_nothing_back_for_its_time() -> None:
+def test_a_height_that_jumped_down_holds_nothing_back_for_its_time():
     for passed, before, low in (
         (9.99, 60.0, False),
         (10.0, 60.0, True),

@@ -2,16 +2,14 @@
 
 import math
 from dataclasses import replace
-from itertools import product
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.errors import ParameterError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.lease import TRANSITIONS, Claim, Lease, LeaseConfig, LeaseEvent, Role
-from chute_ros.transitions import after
 
 FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)
 SECOND = LeaseConfig("b", 1, standby=True, timeout=0.5, listen=4.0)
@@ -38,16 +36,7 @@ def following(config: LeaseConfig, heard: float = T) -> Lease:
     return Lease(Role.FOLLOWING, T - 10.0, looked_at=heard, leader="a", leader_heard=heard)
 
 
-@pytest.mark.parametrize(("role", "event"), list(product(Role, LeaseEvent)))
-def test_a_pair_that_the_table_does_not_list_raises(role: Role, event: LeaseEvent) -> None:
-    if (role, event) in TRANSITIONS:
-        assert after(TRANSITIONS, role, event) is TRANSITIONS[role, event]
-    else:
-        with pytest.raises(TransitionError, match=event.value):
-            after(TRANSITIONS, role, event)
-
-
-def test_one_that_is_alone_leads_at_once_however_long_it_slept() -> None:
+def test_one_that_is_alone_leads_at_once_however_long_it_slept():
     alone = LeaseConfig("a")
     lease = Lease.begin(alone, T)
     assert lease.role is Role.LEADING
@@ -58,7 +47,7 @@ def test_one_that_is_alone_leads_at_once_however_long_it_slept() -> None:
     assert (lease.role, event) == (Role.LEADING, None)
 
 
-def test_one_of_several_that_starts_looks_for_a_leader_before_it_leads() -> None:
+def test_one_of_several_that_starts_looks_for_a_leader_before_it_leads():
     lease = Lease.begin(FIRST, T)
     assert lease.role is Role.FOLLOWING
     assert lease.deadline(FIRST) == pytest.approx(T + 4.5)
@@ -70,7 +59,7 @@ def test_one_of_several_that_starts_looks_for_a_leader_before_it_leads() -> None
     assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
-def test_one_that_starts_beside_a_leader_follows_it() -> None:
+def test_one_that_starts_beside_a_leader_follows_it():
     lease = Lease.begin(SECOND, T)
     own = claim("b", 1, 5, leading=False, empty=True)
     for tenth in range(100):
@@ -82,9 +71,7 @@ def test_one_that_starts_beside_a_leader_follows_it() -> None:
 
 
 @pytest.mark.parametrize(("config", "wait"), [(FIRST, 0.5), (SECOND, 1.0)])
-def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(
-    config: LeaseConfig, wait: float
-) -> None:
+def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(config, wait):
     lease = following(config)
     for tenth in range(1, round(wait * 10)):
         lease, event = lease.looked(config, T + tenth * 0.1)
@@ -94,7 +81,7 @@ def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(
     assert lease.role is Role.LEADING
 
 
-def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence() -> None:
+def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence():
     lease = replace(following(SECOND), leader="a")
     lease, event = lease.looked(SECOND, T + 3.0)
     assert (event, lease.role, lease.leader) == (None, Role.FOLLOWING, "a")
@@ -110,7 +97,7 @@ def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence(
     assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
-def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
+def test_a_leader_that_was_stopped_has_lost_its_lease():
     lease = leading(FIRST)
     lease, event = lease.looked(FIRST, T + 0.5)
     assert event is None
@@ -122,7 +109,7 @@ def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
     assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
-def test_of_two_that_lead_the_one_that_came_later_goes_on() -> None:
+def test_of_two_that_lead_the_one_that_came_later_goes_on():
     lease, event = leading(FIRST).heard(claim("a", 0, 8), claim("b", 1, 9), T + 1.0)
     assert (lease.role, event, lease.leader) == (Role.FOLLOWING, LeaseEvent.OUTRANKED, "b")
     assert (lease.waiting_since, lease.leader_heard) == (T + 1.0, T + 1.0)
@@ -130,7 +117,7 @@ def test_of_two_that_lead_the_one_that_came_later_goes_on() -> None:
     assert (lease.role, event) == (Role.LEADING, None)
 
 
-def test_one_that_knows_of_nothing_yields_to_one_that_knows_of_a_flight() -> None:
+def test_one_that_knows_of_nothing_yields_to_one_that_knows_of_a_flight():
     # It was started in flight and did not find the leader in time: its number is the higher.
     fresh, flying = claim("b", 1, 9, empty=True), claim("a", 0, 8)
     lease, event = leading(SECOND).heard(fresh, flying, T)
@@ -148,9 +135,7 @@ def test_one_that_knows_of_nothing_yields_to_one_that_knows_of_a_flight() -> Non
     st.booleans(),
     st.booleans(),
 )
-def test_of_two_leaders_exactly_one_yields(
-    rank: int, other_rank: int, seen: int, other_seen: int, empty: bool, other_empty: bool
-) -> None:
+def test_of_two_leaders_exactly_one_yields(rank, other_rank, seen, other_seen, empty, other_empty):
     if rank == other_rank:
         return
     one = LeaseConfig("a", rank, standby=True)
@@ -162,12 +147,12 @@ def test_of_two_leaders_exactly_one_yields(
     assert (first is LeaseEvent.OUTRANKED) != (second is LeaseEvent.OUTRANKED)
 
 
-def test_a_follower_is_no_rival() -> None:
+def test_a_follower_is_no_rival():
     lease, event = leading(FIRST).heard(claim("a", 0, 8), claim("b", 1, 99, leading=False), T)
     assert (lease.role, event, lease.highest) == (Role.LEADING, None, 99)
 
 
-def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -> None:
+def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard():
     lease, event = leading(FIRST).refused(9, T)
     assert (lease.role, event) == (Role.FOLLOWING, LeaseEvent.REFUSED)
     assert (lease.highest, lease.leader) == (9, "")
@@ -180,7 +165,7 @@ def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -
     assert lease.next_epoch(FIRST, 8) == 12
 
 
-def test_one_that_was_refused_stands_back_all_the_same_and_then_leads_from_then_on() -> None:
+def test_one_that_was_refused_stands_back_all_the_same_and_then_leads_from_then_on():
     refused, _ = leading(FIRST).refused(12, T)
     own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
     lease, event = refused.heard(own, other, T + 1.0)
@@ -204,7 +189,7 @@ def claims(lease: Lease, leader: int, own: int, tenths: range) -> tuple[Lease, L
     return lease, event
 
 
-def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
+def test_a_leader_that_hears_less_than_a_follower_loses_the_lease():
     # Its messages go out and none comes in: it renews its lease, and sees no vehicle fall.
     lease, event = claims(following(SECOND), 0, 2, range(1, 11))
     assert event is None
@@ -230,8 +215,8 @@ def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
     ],
 )
 def test_one_that_starts_again_and_knows_of_a_flight_takes_over_from_one_that_does_not(
-    leader_knows: bool, knows_itself: bool, hears: int, takes_over: bool
-) -> None:
+    leader_knows, knows_itself, hears, takes_over
+):
     """Given two supervisors that were both away as the vehicle fell."""
     lease = Lease.begin(FIRST, T)
     own = knows("a", 0, not knows_itself, hears, leading=False)
@@ -243,7 +228,7 @@ def test_one_that_starts_again_and_knows_of_a_flight_takes_over_from_one_that_do
     assert (lease.leader == "b") is (not takes_over and not undecided)
 
 
-def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens() -> None:
+def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens():
     lease = Lease.begin(FIRST, T)
     deaf = knows("a", 0, False, 1, leading=False)
     other = knows("b", 1, True, 2, leading=True)
@@ -255,7 +240,7 @@ def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens() -> None:
     assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
 
 
-def test_a_leader_that_is_reset_keeps_its_lease() -> None:
+def test_a_leader_that_is_reset_keeps_its_lease():
     lease = following(SECOND)
     flown, reset = knows("b", 1, False, 2, leading=False), knows("a", 0, True, 2, leading=True)
     lease, event = lease.heard(flown, reset, T + 0.1)
@@ -263,19 +248,19 @@ def test_a_leader_that_is_reset_keeps_its_lease() -> None:
 
 
 @pytest.mark.parametrize(("leader", "own"), [(2, 2), (2, 1), (0, 0)])
-def test_a_leader_that_hears_as_much_keeps_it(leader: int, own: int) -> None:
+def test_a_leader_that_hears_as_much_keeps_it(leader, own):
     lease, event = claims(following(SECOND), leader, own, range(1, 50))
     assert (lease.role, event) == (Role.FOLLOWING, None)
 
 
-def test_a_leader_that_misses_a_link_for_a_moment_keeps_it() -> None:
+def test_a_leader_that_misses_a_link_for_a_moment_keeps_it():
     lease, _ = claims(following(SECOND), 1, 2, range(1, 10))
     lease, _ = claims(lease, 2, 2, range(10, 11))
     lease, event = claims(lease, 1, 2, range(11, 20))
     assert (lease.role, event) == (Role.FOLLOWING, None)
 
 
-def test_a_follower_that_slept_counts_from_its_waking() -> None:
+def test_a_follower_that_slept_counts_from_its_waking():
     lease, _ = claims(following(SECOND), 1, 2, range(1, 5))
     lease, event = lease.looked(SECOND, T + 3.0)
     assert event is None
@@ -296,7 +281,7 @@ def looks(
     return lease, event
 
 
-def test_a_follower_whose_network_is_gone_does_not_take_over() -> None:
+def test_a_follower_whose_network_is_gone_does_not_take_over():
     # The last heartbeat of a link came with the leader's last claim, or a little later.
     lease, event = looks(following(SECOND), range(1, 100), link_heard=T + 0.45)
     assert (lease.role, event) == (Role.FOLLOWING, None)
@@ -310,14 +295,14 @@ def test_a_follower_whose_network_is_gone_does_not_take_over() -> None:
     assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
-def test_a_leader_is_dead_where_links_are_heard_after_it() -> None:
+def test_a_leader_is_dead_where_links_are_heard_after_it():
     lease, event = looks(following(SECOND), range(1, 10), link_heard=T + 0.5)
     assert event is None
     lease, event = looks(lease, range(10, 11), link_heard=T + 0.5)
     assert (lease.role, event) == (Role.LEADING, LeaseEvent.SILENCE)
 
 
-def test_where_links_are_rarely_heard_the_next_heartbeat_decides() -> None:
+def test_where_links_are_rarely_heard_the_next_heartbeat_decides():
     slow = replace(SECOND, deaf_after=6.0)
     lease = following(slow)
     for tenth in range(1, 30):
@@ -328,7 +313,7 @@ def test_where_links_are_rarely_heard_the_next_heartbeat_decides() -> None:
 
 
 @given(st.integers(0, LARGEST_EPOCH), st.integers(0, RANKS - 1))
-def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) -> None:
+def test_each_rank_has_its_own_epochs_each_above_the_last(seen, rank):
     epoch = epoch_above(seen, rank)
     assert seen < epoch <= seen + RANKS
     assert epoch % RANKS == rank
@@ -343,14 +328,14 @@ def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) 
         ({"timeout": 60.5}, "lease_timeout is 60.5"),
     ],
 )
-def test_a_wrong_setting_says_what_is_allowed(settings: dict[str, float], words: str) -> None:
+def test_a_wrong_setting_says_what_is_allowed(settings, words):
     with pytest.raises(ParameterError, match=words):
         replace(FIRST, **settings)
     for timeout in (0.15, 60.0):
         assert LeaseConfig("a", timeout=timeout).timeout == timeout
 
 
-def test_a_claim_that_no_supervisor_makes_is_known_for_it() -> None:
+def test_a_claim_that_no_supervisor_makes_is_known_for_it():
     nothing_above = "above which there is none"
     for other, hearer, why in (
         (claim("x", 9, 4), 0, "rank 9 (0 to 3)"),
@@ -372,9 +357,7 @@ def test_a_claim_that_no_supervisor_makes_is_known_for_it() -> None:
 
 
 @given(st.integers(0, RANKS - 1), st.integers(0, LARGEST_EPOCH), st.integers(0, RANKS - 1))
-def test_whom_one_listens_to_leaves_a_number_for_the_takeover(
-    rank: int, epoch: int, other_rank: int
-) -> None:
+def test_whom_one_listens_to_leaves_a_number_for_the_takeover(rank, epoch, other_rank):
     config = LeaseConfig("a", rank, standby=True)
     other = claim("x", other_rank, epoch, leading=False)
     if not other.implausible(rank):
@@ -382,13 +365,13 @@ def test_whom_one_listens_to_leaves_a_number_for_the_takeover(
         assert lease.next_epoch(config, 0) <= LARGEST_EPOCH
 
 
-def test_one_that_was_deaf_while_it_listened_after_its_start_listens_on() -> None:
+def test_one_that_was_deaf_while_it_listened_after_its_start_listens_on():
     lease, _ = Lease.begin(FIRST, T).looked(FIRST, T)
     lease, event = lease.looked(FIRST, T + 0.6)
     assert (event, lease.waiting_since) == (None, T + 4.0)
 
 
-def test_one_that_takes_over_has_no_leader_any_more() -> None:
+def test_one_that_takes_over_has_no_leader_any_more():
     lease = Lease(Role.FOLLOWING, T - 10.0, looked_at=T, leader="b", leader_heard=T)
     lease, event = lease.looked(FIRST, T + 0.5)
     assert (event, lease.role, lease.leader) == (LeaseEvent.SILENCE, Role.LEADING, "")
@@ -396,20 +379,20 @@ def test_one_that_takes_over_has_no_leader_any_more() -> None:
     assert math.isnan(lease.leader_heard)
 
 
-def test_of_two_with_the_same_claim_neither_yields() -> None:
+def test_of_two_with_the_same_claim_neither_yields():
     lease = Lease(Role.LEADING, T, looked_at=T)
     lease, event = lease.heard(claim("a", 0, 4), claim("b", 0, 4), T + 1.0)
     assert (event, lease.role) == (None, Role.LEADING)
 
 
 @pytest.mark.parametrize(("later", "deadline"), [(0.0, 1.25), (0.125, 1.625)])
-def test_one_that_heard_a_link_just_so_long_ago_is_not_deaf(later: float, deadline: float) -> None:
+def test_one_that_heard_a_link_just_so_long_ago_is_not_deaf(later, deadline):
     lease = Lease(Role.FOLLOWING, T - 10.0, looked_at=T + 0.75, leader="b", leader_heard=T + 0.75)
     lease, event = lease.looked(FIRST, T + 1.0 + later, link_heard=T)
     assert (event, lease.deadline(FIRST)) == (None, T + deadline)
 
 
-def test_one_that_took_over_as_it_hears_more_forgets_that_with_the_lease() -> None:
+def test_one_that_took_over_as_it_hears_more_forgets_that_with_the_lease():
     lease = Lease(
         Role.FOLLOWING, T, looked_at=T, leader="b", leader_heard=T, hears_more_since=T - 0.25
     )
@@ -421,7 +404,7 @@ def test_one_that_took_over_as_it_hears_more_forgets_that_with_the_lease() -> No
     assert lease.deadline(FIRST) == T + 1.5, "it has to hear less anew"
 
 
-def test_the_table_once_more() -> None:
+def test_the_table_once_more():
     told = {f"{role.name} {event.name} {to.name}" for (role, event), to in TRANSITIONS.items()}
     assert told == {
         "FOLLOWING SILENCE LEADING",
@@ -434,7 +417,7 @@ def test_the_table_once_more() -> None:
     }
 
 
-def test_one_that_is_told_nothing_else_is_alone_and_begins_with_the_first_number() -> None:
+def test_one_that_is_told_nothing_else_is_alone_and_begins_with_the_first_number():
     alone = LeaseConfig("a")
     assert (alone.rank, alone.standby) == (0, False)
     assert (alone.timeout, alone.listen, alone.deaf_after) == (0.5, 4.0, 1.0)

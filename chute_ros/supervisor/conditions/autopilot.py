@@ -14,8 +14,7 @@ from chute_ros.supervisor.conditions.base import JUST_AFTER, Condition, Finding
 from chute_ros.supervisor.conditions.measurement import known_by
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import FALL_SIGNS
-from chute_ros.supervisor.profile_lines import ProfileLines
-from chute_ros.supervisor.yaml_lines import Where
+from chute_ros.supervisor.yaml_lines import ProfileLines, Where
 
 if TYPE_CHECKING:
     from chute_ros.supervisor.config import SupervisorConfig

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from chute_ros.supervisor.profile_lines import ProfileLines
-from chute_ros.supervisor.yaml_lines import Where
+from chute_ros.supervisor.yaml_lines import ProfileLines, Where
 
 if TYPE_CHECKING:  # both hold rules, which hold conditions
     from chute_ros.supervisor.config import SupervisorConfig

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from chute_ros.supervisor.conditions.base import Condition, Finding
 from chute_ros.supervisor.link_evidence import LinkJudgement
-from chute_ros.supervisor.profile_lines import ALL, ANY, ProfileLines
-from chute_ros.supervisor.yaml_lines import Where
+from chute_ros.supervisor.yaml_lines import ALL, ANY, ProfileLines, Where
 
 if TYPE_CHECKING:
     from chute_ros.supervisor.config import SupervisorConfig

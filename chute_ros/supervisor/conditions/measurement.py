@@ -24,8 +24,7 @@ from chute_ros.supervisor.measurements import (
     VERTICAL_SPEED,
     Limits,
 )
-from chute_ros.supervisor.profile_lines import ProfileLines
-from chute_ros.supervisor.yaml_lines import Where
+from chute_ros.supervisor.yaml_lines import ProfileLines, Where
 
 if TYPE_CHECKING:
     from chute_ros.supervisor.config import SupervisorConfig
