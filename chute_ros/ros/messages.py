@@ -177,33 +177,16 @@ def lease_claim_from(message: SupervisorLease) -> LeaseClaim:
 
 def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> ParachuteStatus:
     """As it is published on parachute/status."""
-    message = ParachuteStatus()
+    message = ParachuteStatus(link=link)
     message.header.stamp = stamp
-    message.link = link
-    message.device = status.device
-    message.link_state = int(status.link_state)
-    message.state = int(status.state)
-    message.armed = status.armed
-    message.deployed = status.deployed
-    message.deployment_trigger = status.deployment_trigger
-    message.armed_triggers = int(status.armed_triggers)
-    message.error_flags = int(status.error_flags)
-    message.safety_flags = int(status.safety_flags)
-    message.ats_arm_altitude = status.ats_arm_altitude
-    message.height = status.height
-    message.backup_voltage = status.backup_voltage
-    message.uptime = status.uptime
-    message.packed_date = status.packed_date
-    message.faults = list(status.faults)
+    _fill(message, status)
     return message
 
 
 def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
     """As it is published on vehicle/state. stamp: when the picture was made."""
     message = VehicleState()
-    for field in dataclasses.fields(state):
-        value = getattr(state, field.name)
-        setattr(message, field.name, int(value) if isinstance(value, enum.IntEnum) else value)
+    _fill(message, state)
     known = [age for age in (getattr(state, name) for name in model.AGES) if not math.isnan(age)]
     if known:
         message.header.stamp = before(stamp, min(known))
@@ -212,37 +195,24 @@ def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
 
 def vehicle_state_from(message: VehicleState) -> model.VehicleState:
     """What somebody published on vehicle/state; a number without a name reads as unknown."""
-    values = {f.name: getattr(message, f.name) for f in dataclasses.fields(model.VehicleState)}
-    values["link_state"] = _known(model.LinkState, values["link_state"])
+    values = _values(message, model.VehicleState)
     values["armed"] = _known(model.Armed, values["armed"])
     values["landed_state"] = _known(model.LandedState, values["landed_state"])
     for name in model.AGES:
         if values[name] < 0.0:
             values[name] = model.NAN
-    values["faults"] = tuple(values["faults"])
     return model.VehicleState(**values)
 
 
 def parachute_from(message: ParachuteStatus) -> model.ParachuteStatus:
     """What a device node published on parachute/status; a number without a name reads as
     unknown."""
-    return model.ParachuteStatus(
-        device=message.device,
-        link_state=_known(model.LinkState, message.link_state),
-        state=_known(model.ParachuteState, message.state),
-        armed=message.armed,
-        deployed=message.deployed,
-        deployment_trigger=message.deployment_trigger,
-        armed_triggers=model.TriggerFlags(message.armed_triggers),
-        error_flags=model.ErrorFlags(message.error_flags),
-        safety_flags=model.SafetyFlags(message.safety_flags),
-        ats_arm_altitude=message.ats_arm_altitude,
-        height=message.height,
-        backup_voltage=message.backup_voltage,
-        uptime=message.uptime,
-        packed_date=message.packed_date,
-        faults=tuple(message.faults),
-    )
+    values = _values(message, model.ParachuteStatus)
+    values["state"] = _known(model.ParachuteState, values["state"])
+    values["armed_triggers"] = model.TriggerFlags(values["armed_triggers"])
+    values["error_flags"] = model.ErrorFlags(values["error_flags"])
+    values["safety_flags"] = model.SafetyFlags(values["safety_flags"])
+    return model.ParachuteStatus(**values)
 
 
 def decision(one: model.Decision, stamp: Time) -> SafetyDecision:
@@ -287,6 +257,23 @@ def request_words(request: Any) -> str:
 def answered(service: str, request: Any, response: Any) -> str:
     """A service call with its answer, for a log."""
     return f"{service}({request_words(request)}) answered: {response.message}"
+
+
+def _fill(message: Any, one: model.ParachuteStatus | model.VehicleState) -> None:
+    """Of each field of one that of its name in message."""
+    for field in dataclasses.fields(one):
+        value = getattr(one, field.name)
+        setattr(message, field.name, int(value) if isinstance(value, enum.Enum) else value)
+
+
+def _values(
+    message: Any, kind: type[model.ParachuteStatus | model.VehicleState]
+) -> dict[str, Any]:
+    """The other way round: as message has them, but for what both types have."""
+    values = {field.name: getattr(message, field.name) for field in dataclasses.fields(kind)}
+    values["link_state"] = _known(model.LinkState, values["link_state"])
+    values["faults"] = tuple(values["faults"])
+    return values
 
 
 EnumT = TypeVar("EnumT", bound=enum.IntEnum)

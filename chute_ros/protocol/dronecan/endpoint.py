@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
-from chute_ros.protocol.dronecan.data_types import DataTypes
+from chute_ros.protocol.dronecan.data_types import DataType, DataTypes
 from chute_ros.protocol.dronecan.transfer import (
     TRANSFER_IDS,
     Assembler,
@@ -88,17 +88,7 @@ class Endpoint:
     ) -> None:
         """Send a request."""
         data_type = self.types.request(service)
-        payload = data_type.encode(values)
-        transfer = Transfer(
-            TransferKind.REQUEST,
-            data_type.id,
-            self.node_id,
-            server,
-            transfer_id,
-            payload,
-            priority,
-        )
-        self._send(transfer, data_type.base_crc)
+        self._call(TransferKind.REQUEST, data_type, server, transfer_id, values, priority)
 
     def respond(
         self, request: ReceivedTransfer, values: Mapping[str, Any], priority: int = 16
@@ -116,22 +106,25 @@ class Endpoint:
     ) -> None:
         """Answer the request with this transfer id."""
         data_type = self.types.response(service)
-        payload = data_type.encode(values)
-        transfer = Transfer(
-            TransferKind.RESPONSE,
-            data_type.id,
-            self.node_id,
-            client,
-            transfer_id,
-            payload,
-            priority,
-        )
-        self._send(transfer, data_type.base_crc)
+        self._call(TransferKind.RESPONSE, data_type, client, transfer_id, values, priority)
 
     def take_output(self) -> list[bytes]:
         """Frames to send, oldest first; each is handed out once."""
         output, self._output = self._output, []
         return output
+
+    def _call(
+        self,
+        kind: TransferKind,
+        data_type: DataType,
+        other: int,
+        transfer_id: int,
+        values: Mapping[str, Any],
+        priority: int,
+    ) -> None:
+        where = (self.node_id, other, transfer_id)
+        transfer = Transfer(kind, data_type.id, *where, data_type.encode(values), priority)
+        self._send(transfer, data_type.base_crc)
 
     def _send(self, transfer: Transfer, base_crc: int, discriminator: int = 0) -> None:
         self._output += [pack(frame) for frame in frames_of(transfer, base_crc, discriminator)]
