@@ -1,7 +1,5 @@
 """A bench for each test of the nodes, and supervisors that are processes of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

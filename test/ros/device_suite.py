@@ -5,8 +5,6 @@ in; one whose device tells nothing subclasses NodeSuite. The names and texts bel
 of all links.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -115,7 +113,7 @@ class NodeSuite:
 
         return self.bench.until(found, f"{outcome.name} is reported")
 
-    def test_its_heartbeat_is_numbered_and_signed(self, device: SimulatedDevice) -> None:
+    def test_its_heartbeat_is_numbered_and_signed(self, device):
         self.bench.until(lambda: len(self.beats) >= 5, "it beats")
         numbers = [beat.seq for beat in self.beats]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -123,9 +121,7 @@ class NodeSuite:
         assert not any(beat.supervisor for beat in self.beats)
 
     @pytest.mark.parametrize("what", ["update", "next_deadline"])
-    def test_a_node_whose_link_fails_inside_gives_no_sign_of_life(
-        self, device: SimulatedDevice, what: str, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_a_node_whose_link_fails_inside_gives_no_sign_of_life(self, device, what, monkeypatch):
         self.ready_to_deploy(device)
         node = next(one for one in self.bench.nodes if one.get_name() == self.name)
         diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
@@ -157,9 +153,7 @@ class NodeSuite:
         self.bench.until(lambda: len(self.beats) > told, "it is received again")
         self.await_link(self.alive)
 
-    def test_a_node_that_has_just_started_is_not_told_to_hang(
-        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_a_node_that_has_just_started_is_not_told_to_hang(self, device, monkeypatch):
         self.bench.until(lambda: self.beats, "its link runs")
         node = next(one for one in self.bench.nodes if one.get_name() == self.name)
         told: list[DiagnosticStatus] = []
@@ -170,9 +164,7 @@ class NodeSuite:
         node._diagnose()
         assert told == []
 
-    def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
-        self, device: SimulatedDevice
-    ) -> None:
+    def test_a_decision_to_deploy_is_carried_out_once_and_each_step_reported(self, device):
         self.ready_to_deploy(device)
         decision = self.decide(Action.DEPLOY)
         self.await_report(self.steps[-1], decision)
@@ -183,32 +175,26 @@ class NodeSuite:
         assert {report.link for report in self.reports} == {self.name}
         assert {report.action for report in self.reports} == {Action.DEPLOY}
         assert all(report.detail for report in self.reports)
+        # When it comes again, then it is reported again and not fired twice.
+        for _ in range(3):
+            self.reports.clear()
+            self.decide(Action.DEPLOY, id=decision.id)
+            assert self.await_report(self.steps[-1], decision).action == Action.DEPLOY
+        assert device.commands_to_deploy() == 1
 
-    @pytest.mark.parametrize(
-        "fields",
-        [
-            {"targets": ["another_link"]},
-            {"targets": []},
-            {"shadow": True},
-            {"age": 30.0},
-            {"age": -30.0},
-        ],
-        ids=["for another", "for nobody", "shadow", "old", "from the future"],
-    )
-    def test_a_decision_that_is_not_for_it_now_is_not_acted_on(
-        self, device: SimulatedDevice, fields: dict[str, Any]
-    ) -> None:
+    def test_a_decision_that_is_not_for_it_now_is_not_acted_on(self, device):
+        """For another, for nobody, in shadow, old, from the future."""
         self.ready_to_deploy(device)
-        self.decide(Action.DEPLOY, **fields)
-        # What follows comes after it on the same topic: once it is done, so is the judgement.
-        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
-        assert not device.deployed
-        assert device.commands_to_deploy() == 0
+        targets: list[dict[str, Any]] = [{"targets": ["another_link"]}, {"targets": []}]
+        for fields in (*targets, {"shadow": True}, {"age": 30.0}, {"age": -30.0}):
+            self.decide(Action.DEPLOY, **fields)
+            # What follows comes after it on the same topic: once it is done, so is the judgement.
+            self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
+            assert not device.deployed, fields
+            assert device.commands_to_deploy() == 0, fields
 
     @pytest.mark.parametrize("step", [3600.0, -3600.0], ids=["forward", "back"])
-    def test_a_wall_clock_that_is_set_makes_no_decision_older(
-        self, device: SimulatedDevice, step: float
-    ) -> None:
+    def test_a_wall_clock_that_is_set_makes_no_decision_older(self, device, step):
         self.ready_to_deploy(device)
         await_told = self.told_in_diagnostics()
         ages = [0.0]
@@ -224,9 +210,7 @@ class NodeSuite:
         self.bench.until(device.commands_to_deploy, "it comes over the wire")
         assert device.commands_to_deploy() == 1
 
-    def test_an_answer_of_the_supervisor_shows_that_its_clock_is_behind(
-        self, device: SimulatedDevice
-    ) -> None:
+    def test_an_answer_of_the_supervisor_shows_that_its_clock_is_behind(self, device):
         """Given a node that was started anew on a host whose clock is an hour ahead."""
         behind = 3600.0
         self.ready_to_deploy(device)
@@ -252,29 +236,14 @@ class NodeSuite:
         self.bench.until(device.commands_to_deploy, "it comes over the wire")
         assert device.commands_to_deploy() == 1
 
-    def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.ready_to_deploy(device)
-        decision = self.decide(Action.DEPLOY)
-        self.await_report(self.steps[-1], decision)
-        sent = self.bench.until(device.commands_to_deploy, "it comes over the wire")
-        for _ in range(3):
-            self.reports.clear()
-            self.decide(Action.DEPLOY, id=decision.id)
-            assert self.await_report(self.steps[-1], decision).action == Action.DEPLOY
-        assert device.commands_to_deploy() == sent == 1
-
-    def test_a_decision_of_an_older_epoch_fails_and_names_the_newest(
-        self, device: SimulatedDevice
-    ) -> None:
+    def test_a_decision_of_an_older_epoch_fails_and_names_the_newest(self, device):
         self.ready_to_deploy(device)
         self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE, epoch=7))
         old = self.decide(Action.DEPLOY, epoch=6, id=10_000)
         assert self.await_report(Outcome.FAILED, old).newest_epoch == 7
         assert not device.deployed
 
-    def test_a_decision_is_not_heard_by_a_node_that_starts_later(self, bench: Bench) -> None:
+    def test_a_decision_is_not_heard_by_a_node_that_starts_later(self, bench):
         self.bench, self.numbers = bench, iter(range(1, 10))
         self.statuses = bench.follow(ParachuteStatus, "parachute/status")
         self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
@@ -288,8 +257,8 @@ class NodeSuite:
         assert device.commands_to_deploy() == 0
 
     def test_a_decision_whose_call_fails_inside_is_reported_as_failed_and_never_as_sent(
-        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+        self, device, monkeypatch
+    ):
         """Taken for sent, the supervisor would wait, and not try the next parachute."""
         self.ready_to_deploy(device)
         node = next(one for one in self.bench.nodes if one.get_name() == self.name)
@@ -334,16 +303,21 @@ class DeviceSuite(NodeSuite):
             lambda: self.beats[-1].device_healthy and self.statuses, "the device is healthy"
         )
 
-    def armed(self, device: SimulatedDevice) -> None:
-        self.plugged(device)
+    def deploy(self, force: bool = False) -> Deploy.Response:
+        """A person asks for it; the answer."""
+        return self.bench.call(Deploy, f"{self.name}/deploy", force=force, reason="a test")
+
+    def arm(self) -> None:
         # A busy machine may have held the device up for so long that it is STALE just then.
         self.bench.until(
             lambda: self.bench.call(Arm, f"{self.name}/arm", arm=True).success, "it is armed"
         )
 
-    def test_a_wire_on_which_nobody_is_heard_is_told_once(
-        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def armed(self, device: SimulatedDevice) -> None:
+        self.plugged(device)
+        self.arm()
+
+    def test_a_wire_on_which_nobody_is_heard_is_told_once(self, device, monkeypatch):
         monkeypatch.setattr(link_log, "QUIET_FOR", 1.5)
         said = self.bench.follow_log()
         device.plug_in_mute()
@@ -358,16 +332,30 @@ class DeviceSuite(NodeSuite):
         self.bench.until(lambda: len(diagnostics) >= looked + 3, "it was looked at again")
         assert len(told()) == 1
 
-    def test_never_seen_ok_stale_lost_and_regained(self, device: SimulatedDevice) -> None:
+    def test_never_seen_ok_stale_lost_and_regained(self, device):
+        """While it is silent its node goes on, and its word gets no younger."""
+
+        def stamps(state: LinkState) -> list[float]:
+            return [seconds(s.header.stamp) for s in self.statuses if s.link_state == state]
+
+        def now() -> float:
+            return seconds(self.bench.client.get_clock().now().to_msg())
+
         self.await_link(LinkState.NEVER_SEEN)
         assert self.beats[-1].age != self.beats[-1].age, "not known is NaN"
         self.plugged(device)
         assert self.beats[-1].device_healthy
+        assert now() - stamps(LinkState.OK)[-1] < 20.0
         device.fall_silent()
         self.await_link(LinkState.STALE)
         assert not self.beats[-1].device_healthy
         self.await_link(LinkState.LOST)
         assert self.beats[-1].age >= 0.8
+        self.bench.until(lambda: stamps(LinkState.LOST), "its status is LOST")
+        # The newest STALE: a machine that stood still may have seen one before.
+        stale, lost = stamps(LinkState.STALE)[-1], stamps(LinkState.LOST)[-1]
+        assert now() - lost >= 0.8, "the limit of LOST is that old"
+        assert lost == pytest.approx(stale, abs=0.01), "both are of its last word"
         device.speak_again()
         self.await_link(LinkState.OK)
         told = [beat.link_state for beat in self.beats]
@@ -378,28 +366,7 @@ class DeviceSuite(NodeSuite):
             lambda: self.statuses[-1].link_state == LinkState.OK, "the status is back, too"
         )
 
-    def test_the_stamp_of_its_status_is_that_of_its_newest_data(
-        self, device: SimulatedDevice
-    ) -> None:
-        """Given a device that falls silent: its node goes on, and its word gets no younger."""
-        self.plugged(device)
-        self.bench.until(lambda: self.statuses, "its status is told")
-
-        def told(state: LinkState) -> list[float]:
-            return [seconds(s.header.stamp) for s in self.statuses if s.link_state == state]
-
-        def now() -> float:
-            return seconds(self.bench.client.get_clock().now().to_msg())
-
-        assert now() - seconds(self.statuses[-1].header.stamp) < 20.0
-        device.fall_silent()
-        self.bench.until(lambda: told(LinkState.LOST), "its status is LOST")
-        # The newest STALE: a machine that stood still may have seen one before.
-        stale, lost = told(LinkState.STALE)[-1], told(LinkState.LOST)[-1]
-        assert now() - lost >= 0.8, "the limit of LOST is that old"
-        assert lost == pytest.approx(stale, abs=0.01), "both are of its last word"
-
-    def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
+    def test_a_device_that_breaks_down_is_not_healthy(self, device):
         self.plugged(device)
         fault = device.break_down()
         self.bench.until(
@@ -409,32 +376,31 @@ class DeviceSuite(NodeSuite):
         assert self.beats[-1].link_state == LinkState.OK, "the wire itself is well"
         assert self.statuses[-1].state == ParachuteState.ABNORMAL
 
-    def test_arm_and_disarm_are_confirmed_by_the_devices_own_status(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.armed(device)
+    def test_arm_and_disarm_are_confirmed_by_the_devices_own_status(self, device):
+        # Given one that is not armed, then it is not deployed.
+        self.plugged(device)
+        answer = self.deploy()
+        assert (answer.success, answer.accepted) == (False, False)
+        assert self.not_armed in answer.message
+        assert not device.deployed
+        # When it is armed and disarmed, then its status says so.
+        self.arm()
         self.bench.until(lambda: self.statuses[-1].armed, "the status says so")
         assert self.statuses[-1].state == ParachuteState.ARMED
         answer = self.bench.call(Arm, f"{self.name}/arm", arm=False)
         assert answer.success, answer.message
         self.bench.until(lambda: not self.statuses[-1].armed, "the status says so")
 
-    def test_deploy_is_accepted_and_then_shown(self, device: SimulatedDevice) -> None:
+    def test_deploy_is_accepted_and_then_shown_and_published_with_its_answer(self, device):
+        told = self.bench.follow(PersonRequest, "safety/person")
         self.ready_to_deploy(device)
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        told.clear()
+        answer = self.deploy(force=True)
         expected = (True, self.acknowledges)
         assert (answer.success, answer.accepted) == expected, answer.message
         assert device.deployed
         self.bench.until(lambda: self.statuses[-1].deployed, "the status says so")
-
-    def test_a_call_of_deploy_is_published_when_it_comes_and_when_it_is_answered(
-        self, device: SimulatedDevice
-    ) -> None:
-        told = self.bench.follow(PersonRequest, "safety/person")
-        self.ready_to_deploy(device)
-        told.clear()
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", force=True, reason="a test")
-        self.bench.until(lambda: len(told) == 2, "both are published")
+        self.bench.until(lambda: len(told) == 2, "the call and its answer are published")
         called, answered = told
         assert (called.link, called.service) == (self.name, "~/deploy")
         assert called.request == "force=True, reason='a test'"
@@ -446,63 +412,24 @@ class DeviceSuite(NodeSuite):
         assert (answered.success, answered.accepted) == (answer.success, answer.accepted)
         assert answered.message == answer.message
         assert answered.after > 0.0
-
-    def test_deploy_of_what_is_out_already_sends_nothing(self, device: SimulatedDevice) -> None:
-        self.ready_to_deploy(device)
-        self.bench.call(Deploy, f"{self.name}/deploy", reason="first")
+        # When it is out already, then nothing is sent.
         sent = device.commands_to_deploy()
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="second")
+        answer = self.deploy()
         assert (answer.success, answer.accepted) == (True, False)
         assert "already" in answer.message
         assert device.commands_to_deploy() == sent
 
-    def test_deploy_of_a_device_that_is_not_armed_is_refused(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.plugged(device)
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
-        assert (answer.success, answer.accepted) == (False, False)
-        assert self.not_armed in answer.message
-        assert not device.deployed
-
-    def test_deploy_too_near_the_ground_is_refused(self, device: SimulatedDevice) -> None:
+    def test_deploy_too_near_the_ground_is_refused_whoever_orders_it(self, device):
         self.ready_to_deploy(device)
         device.come_to_ground()
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        answer = self.deploy()
         assert (answer.success, answer.accepted) == (False, False)
         assert self.too_near in answer.message
+        assert self.await_report(Outcome.FAILED, self.decide(Action.DEPLOY)).detail
         assert not device.deployed
 
-    def test_deploy_says_plainly_when_nothing_came_back(self, device: SimulatedDevice) -> None:
-        self.ready_to_deploy(device)
-        device.stop_answering()
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
-        assert (answer.success, answer.accepted) == (False, False)
-        assert "given up after" in answer.message
-        missing = "no acknowledgement" if self.acknowledges else "never showed"
-        assert missing in answer.message
-
-    def test_deploy_says_plainly_when_only_the_status_did_not_come(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.ready_to_deploy(device)
-        device.be_stuck()
-        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
-        assert (answer.success, answer.accepted) == (False, self.acknowledges)
-        assert ("acknowledged after" if self.acknowledges else "sent ") in answer.message
-        assert "never showed" in answer.message
-
-    @pytest.mark.parametrize(("kind", "service"), [(Arm, "arm"), (Deploy, "deploy")])
-    def test_without_any_device_a_request_is_refused_at_once(
-        self, device: SimulatedDevice, kind: Any, service: str
-    ) -> None:
-        answer = self.bench.call(kind, f"{self.name}/{service}")
-        assert not answer.success
-        assert "received" in answer.message, answer.message
-
-    def test_a_service_that_waits_stops_neither_heartbeat_nor_status(
-        self, device: SimulatedDevice
-    ) -> None:
+    def test_deploy_says_plainly_when_nothing_came_back_and_holds_up_nothing(self, device):
+        """While it waits, heartbeat and status go on."""
         self.ready_to_deploy(device)
         device.stop_answering()
         future = self.bench.ask(Deploy, f"{self.name}/deploy", reason="a test")
@@ -512,12 +439,21 @@ class DeviceSuite(NodeSuite):
         self.bench.until(lambda: len(self.beats) >= 5 and len(self.statuses) >= 3, "both go on")
         assert not future.done(), "all that while the service was waiting"
         self.bench.until(future.done, "the service ends")
+        answer = future.result()
+        assert (answer.success, answer.accepted) == (False, False)
+        assert "given up after" in answer.message
+        missing = "no acknowledgement" if self.acknowledges else "never showed"
+        assert missing in answer.message
 
-    def test_a_decision_that_the_device_refuses_is_reported_as_failed(
-        self, device: SimulatedDevice
-    ) -> None:
+    def test_deploy_says_plainly_when_only_the_status_did_not_come(self, device):
         self.ready_to_deploy(device)
-        device.come_to_ground()
-        report = self.await_report(Outcome.FAILED, self.decide(Action.DEPLOY))
-        assert report.detail
-        assert not device.deployed
+        device.be_stuck()
+        answer = self.deploy()
+        assert (answer.success, answer.accepted) == (False, self.acknowledges)
+        assert ("acknowledged after" if self.acknowledges else "sent ") in answer.message
+        assert "never showed" in answer.message
+
+    def test_without_any_device_a_request_is_refused_at_once(self, device):
+        for answer in (self.bench.call(Arm, f"{self.name}/arm"), self.deploy()):
+            assert not answer.success
+            assert "received" in answer.message, answer.message

@@ -1,7 +1,5 @@
 """One test's corner of ROS: nodes, simulators over real UDP, and a client, all in this process."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import shutil

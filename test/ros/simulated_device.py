@@ -1,7 +1,5 @@
 """What the stories of device_suite need of a simulated device, whatever its link."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 

@@ -1,8 +1,6 @@
 """Many starts of a node that soon end, each in a process of its own that parts from one which has
 imported what all need: that takes longer than such a start."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A supervisor among stub device nodes, for the tests of its node."""
 
-from __future__ import annotations
-
 import itertools
 
 from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, SafetyState, VehicleState

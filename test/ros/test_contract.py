@@ -1,7 +1,5 @@
 """The public contract of docs: every topic and service with its type and quality of service."""
 
-from __future__ import annotations
-
 from importlib.metadata import entry_points
 
 import pytest
@@ -19,51 +17,44 @@ from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 VOLATILE, LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
 STATUS, DECISION = (10, VOLATILE), (50, VOLATILE)
 
+DIAGNOSTICS = dict.fromkeys(("/diagnostics", "diagnostics"), ("DiagnosticArray", STATUS))
+#: Of every device node.
+PUBLISHED_BY_DEVICES = DIAGNOSTICS | {
+    "parachute/status": ("ParachuteStatus", STATUS),
+    "safety/heartbeat": ("LinkHeartbeat", STATUS),
+    "safety/request": ("SafetyRequest", STATUS),
+    "safety/person": ("PersonRequest", STATUS),
+    "safety/action": ("ActionReport", DECISION),
+}
+HEARD_BY_DEVICES = {
+    "safety/decision": ("SafetyDecision", DECISION),
+    "safety/heartbeat": ("LinkHeartbeat", STATUS),
+    "safety/state": ("SafetyState", (1, LATCHED)),
+}
 PUBLISHED = {
-    "mavlink_parachute": {
-        "parachute/status": ("ParachuteStatus", STATUS),
+    "mavlink_parachute": PUBLISHED_BY_DEVICES
+    | {
         "vehicle/battery": ("BatteryState", STATUS),
         "vehicle/state": ("VehicleState", STATUS),
-        "safety/heartbeat": ("LinkHeartbeat", STATUS),
-        "safety/request": ("SafetyRequest", STATUS),
-        "safety/person": ("PersonRequest", STATUS),
-        "safety/action": ("ActionReport", DECISION),
-        "/diagnostics": ("DiagnosticArray", STATUS),
-        "diagnostics": ("DiagnosticArray", STATUS),
     },
-    "umbilical": {
-        "parachute/status": ("ParachuteStatus", STATUS),
+    "umbilical": PUBLISHED_BY_DEVICES
+    | {
         "umbilical/telem": ("Telem", STATUS),
         "vehicle/state": ("VehicleState", STATUS),
-        "safety/heartbeat": ("LinkHeartbeat", STATUS),
-        "safety/request": ("SafetyRequest", STATUS),
-        "safety/person": ("PersonRequest", STATUS),
-        "safety/action": ("ActionReport", DECISION),
-        "/diagnostics": ("DiagnosticArray", STATUS),
-        "diagnostics": ("DiagnosticArray", STATUS),
     },
-    "safety_supervisor": {
+    "safety_supervisor": DIAGNOSTICS
+    | {
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/decision": ("SafetyDecision", DECISION),
         "safety/history": ("SafetyDecision", (20, LATCHED)),
         "safety/lease": ("SupervisorLease", STATUS),
         "safety/state": ("SafetyState", (1, LATCHED)),
         "safety/summary": ("SafetySummary", (1, LATCHED)),
-        "/diagnostics": ("DiagnosticArray", STATUS),
-        "diagnostics": ("DiagnosticArray", STATUS),
     },
 }
 SUBSCRIBED = {
-    "mavlink_parachute": {
-        "safety/decision": ("SafetyDecision", DECISION),
-        "safety/heartbeat": ("LinkHeartbeat", STATUS),
-        "safety/state": ("SafetyState", (1, LATCHED)),
-    },
-    "umbilical": {
-        "safety/decision": ("SafetyDecision", DECISION),
-        "safety/heartbeat": ("LinkHeartbeat", STATUS),
-        "safety/state": ("SafetyState", (1, LATCHED)),
-    },
+    "mavlink_parachute": HEARD_BY_DEVICES,
+    "umbilical": HEARD_BY_DEVICES,
     "safety_supervisor": {
         "parachute/status": ("ParachuteStatus", STATUS),
         "vehicle/state": ("VehicleState", STATUS),
@@ -73,35 +64,30 @@ SUBSCRIBED = {
         "safety/lease": ("SupervisorLease", STATUS),
     },
 }
+#: Name, and in chute_msgs its type.
 SERVICES = {
     "mavlink_parachute": {
-        f"mavlink_parachute/{name}": f"chute_msgs/srv/{kind}"
-        for name, kind in {
-            "arm": "Arm",
-            "deploy": "Deploy",
-            "set_triggers": "SetTriggers",
-            "parachute_action": "ParachuteAction",
-            "request_message": "RequestMessage",
-            "set_message_interval": "SetMessageInterval",
-            "get_info": "GetInfo",
-        }.items()
+        "mavlink_parachute/arm": "Arm",
+        "mavlink_parachute/deploy": "Deploy",
+        "mavlink_parachute/set_triggers": "SetTriggers",
+        "mavlink_parachute/parachute_action": "ParachuteAction",
+        "mavlink_parachute/request_message": "RequestMessage",
+        "mavlink_parachute/set_message_interval": "SetMessageInterval",
+        "mavlink_parachute/get_info": "GetInfo",
     },
     "umbilical": {
-        f"umbilical/{name}": f"chute_msgs/srv/{kind}"
-        for name, kind in {
-            "arm": "Arm",
-            "deploy": "Deploy",
-            "command": "UmbilicalCommand",
-            "set_target": "SetTarget",
-            "dump": "Dump",
-        }.items()
+        "umbilical/arm": "Arm",
+        "umbilical/deploy": "Deploy",
+        "umbilical/command": "UmbilicalCommand",
+        "umbilical/set_target": "SetTarget",
+        "umbilical/dump": "Dump",
     },
     "safety_supervisor": {
-        "safety/arm": "chute_msgs/srv/Arm",
-        "safety/deploy": "chute_msgs/srv/Deploy",
-        "safety/kill": "chute_msgs/srv/Kill",
+        "safety/arm": "Arm",
+        "safety/deploy": "Deploy",
+        "safety/kill": "Kill",
         "safety/reset": "std_srvs/srv/Trigger",
-        "safety/set_mode": "chute_msgs/srv/SetMode",
+        "safety/set_mode": "SetMode",
     },
 }
 ROS_TOPICS = {"/rosout", "/parameter_events"}
@@ -121,7 +107,7 @@ SAID_AGAIN = ("safety/heartbeat", "safety/decision", "parachute/status", "vehicl
 
 
 @pytest.fixture(params=["/", "/drone1", "/fleet/drone1"])
-def bench(request, ros):
+def vehicle(request, ros):
     one = Bench(request.param)
     yield one
     one.close()
@@ -146,28 +132,31 @@ def ends(found):
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_names_types_and_qualities_are_the_contracts_and_nothing_is_missing(bench, name):
+def test_names_types_and_qualities_are_the_contracts_and_nothing_is_missing(vehicle, name):
     make, parameters = NODES[name]
-    node = bench.add(make, **parameters)
+    node = vehicle.add(make, **parameters)
     assert node.get_name() == name
-    assert node.get_namespace() == bench.namespace
+    assert node.get_namespace() == vehicle.namespace
     for found, contract in ((node.publishers, PUBLISHED), (node.subscriptions, SUBSCRIBED)):
-        expected = {absolute(bench, topic): end for topic, end in contract[name].items()}
+        expected = {absolute(vehicle, topic): end for topic, end in contract[name].items()}
         assert ends(found) == expected
     ours = [p for p in node.publishers if p.topic_name not in ROS_TOPICS]
     assert {p.qos_profile.reliability for p in ours} == {ReliabilityPolicy.RELIABLE}
-    again = {absolute(bench, topic) for topic in SAID_AGAIN}
+    again = {absolute(vehicle, topic) for topic in SAID_AGAIN}
     for end in node.subscriptions:
         if end.topic_name in again:
             assert end.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT, end.topic_name
     offered = {
         service: kind
-        for service, (kind,) in bench.client.get_service_names_and_types_by_node(
-            name, bench.namespace
+        for service, (kind,) in vehicle.client.get_service_names_and_types_by_node(
+            name, vehicle.namespace
         )
         if not kind.startswith(("rcl_interfaces/", "type_description_interfaces/"))
     }
-    assert offered == {absolute(bench, s): kind for s, kind in SERVICES[name].items()}
+    assert offered == {
+        absolute(vehicle, service): kind if "/" in kind else f"chute_msgs/srv/{kind}"
+        for service, kind in SERVICES[name].items()
+    }
 
 
 @pytest.mark.parametrize("name", NODES)
@@ -176,34 +165,27 @@ def test_the_executable_has_the_nodes_name(name):
     assert callable(entry.load())
 
 
-class TestClocks:
-    """Heartbeats follow real time, whatever use_sim_time says."""
+@pytest.mark.parametrize("name", NODES)
+def test_a_simulated_clock_that_stands_does_not_stop_the_heartbeats(bench, name):
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    make, parameters = NODES[name]
+    bench.add(make, **parameters, use_sim_time=True)
+    bench.until(lambda: len(beats) > 5, "it beats")
+    now = bench.client.get_clock().now().nanoseconds * 1e-9
+    assert abs(beats[-1].header.stamp.sec - now) < 20.0, "stamped by the wall clock"
 
-    @pytest.fixture
-    def bench(self, namespace):
-        one = Bench(namespace)
-        yield one
-        one.close()
 
-    @pytest.mark.parametrize("name", NODES)
-    def test_a_simulated_clock_that_stands_does_not_stop_the_heartbeats(self, bench, name):
-        beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-        make, parameters = NODES[name]
-        bench.add(make, **parameters, use_sim_time=True)
-        bench.until(lambda: len(beats) > 5, "it beats")
-        now = bench.client.get_clock().now().nanoseconds * 1e-9
-        assert abs(beats[-1].header.stamp.sec - now) < 20.0, "stamped by the wall clock"
+def test_a_device_is_heard_and_told_all_the_same(bench):
+    statuses = bench.follow(ParachuteStatus, "parachute/status")
+    Network(bench, use_sim_time=True).plug(Module())
+    bench.until(lambda: statuses, "the status is told")
+    assert statuses[-1].link_state == LinkState.OK
 
-    def test_a_device_is_heard_and_told_all_the_same(self, bench):
-        statuses = bench.follow(ParachuteStatus, "parachute/status")
-        Network(bench, use_sim_time=True).plug(Module())
-        bench.until(lambda: statuses, "the status is told")
-        assert statuses[-1].link_state == LinkState.OK
 
-    def test_the_state_is_latched_for_who_comes_late(self, bench):
-        bench.add(SafetySupervisorNode)
-        first = bench.follow(SafetyState, "safety/state", qos.LATCHED)
-        bench.until(lambda: first, "the state is published")
-        late = bench.follow(SafetyState, "safety/state", qos.LATCHED)
-        bench.until(lambda: late, "who comes late is told")
-        assert late[0].header.stamp.sec >= first[0].header.stamp.sec - 1
+def test_the_state_is_latched_for_who_comes_late(bench):
+    bench.add(SafetySupervisorNode)
+    first = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+    bench.until(lambda: first, "the state is published")
+    late = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+    bench.until(lambda: late, "who comes late is told")
+    assert late[0].header.stamp.sec >= first[0].header.stamp.sec - 1

@@ -1,7 +1,5 @@
 """A node that hung finds decisions that were said again and again."""
 
-from __future__ import annotations
-
 import pytest
 from chute_msgs.msg import SafetyDecision
 from node_bench import Bench, stamped
@@ -49,7 +47,7 @@ class Hung:
         self.bench.until(lambda: self.done, "it acts")
 
 
-def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench: Bench) -> None:
+def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench):
     hung = Hung(bench)
     again = ((8, Action.DEPLOY), (7, Action.KILL))
     hung.told(*again * 3, (9, Action.FLIGHT_BLOCK))
@@ -59,8 +57,8 @@ def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench: 
 
 
 def test_those_of_a_supervisor_that_is_deposed_do_not_get_before_its_successors(
-    bench: Bench,
-) -> None:
+    bench,
+):
     hung = Hung(bench)
     hung.told((1, Action.FLIGHT_BLOCK_RELEASE), (9, Action.DEPLOY, 1), epoch=2)
     hung.goes_on()
@@ -68,7 +66,7 @@ def test_those_of_a_supervisor_that_is_deposed_do_not_get_before_its_successors(
     assert hung.carrier.counts()["decisions: older than one already seen"] == 1
 
 
-def test_one_that_fails_keeps_no_other_back(bench: Bench) -> None:
+def test_one_that_fails_keeps_no_other_back(bench):
     hung = Hung(bench)
     hung.told((1, Action.NONE), (2, Action.KILL), (3, Action.DEPLOY))
     with pytest.raises(ZeroDivisionError):
@@ -76,7 +74,7 @@ def test_one_that_fails_keeps_no_other_back(bench: Bench) -> None:
     assert hung.done == [(2, Action.KILL), (3, Action.DEPLOY)]
 
 
-def test_of_more_than_the_queue_holds_the_newest_are_left(bench: Bench) -> None:
+def test_of_more_than_the_queue_holds_the_newest_are_left(bench):
     hung = Hung(bench)
     hung.told(*((number, Action.FLIGHT_BLOCK) for number in range(1, 61)))
     hung.goes_on()

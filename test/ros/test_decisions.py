@@ -1,7 +1,5 @@
 """What mavlink_parachute does with the supervisor's decisions beside the deploy (device_suite)."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What is told of a decision waits for those who carry it out; then comes all, in order."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

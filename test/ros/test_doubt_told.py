@@ -1,8 +1,6 @@
 """What a measurement in doubt, and a parachute that is armed, look like in diagnostics and
 safety/state."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -47,14 +45,14 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
     return {one.key: one.value for one in status.values}
 
 
-def test_a_measurement_in_doubt_says_why_beside_its_value() -> None:
+def test_a_measurement_in_doubt_says_why_beside_its_value():
     sound = decisions_task("safety_supervisor", CONFIG, known(), NOW)
     assert (sound.level, values(sound)["tilt_deg"]) == (DiagnosticStatus.OK, "90.00")
     doubted = decisions_task("safety_supervisor", CONFIG, known(jumped_at=NOW - 2.0), NOW)
     assert values(doubted)["tilt_deg"] == "90.00 (in doubt: it jumped 2.0 s ago)"
 
 
-def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() -> None:
+def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named():
     state = replace(known(), heard=replace(known().heard, disputed=frozenset({"attitude"})))
     task = decisions_task("safety_supervisor", CONFIG, state, NOW)
     assert task.level == DiagnosticStatus.WARN
@@ -79,9 +77,7 @@ ARMED = ParachuteStatus("1/161", LinkState.OK, armed=True)
         (Stage.READY, False, "READY"),
     ],
 )
-def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(
-    stage: Stage, armed: bool, text: str
-) -> None:
+def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(stage, armed, text):
     state, link = known(), CONFIG.deploy_links[0]
     evidence = replace(WELL, devices=MappingProxyType({"1/161": replace(ARMED, armed=armed)}))
     links = MappingProxyType({**state.heard.links, link: evidence})
@@ -91,7 +87,7 @@ def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(
     assert decisions_task("safety_supervisor", CONFIG, state, NOW).message.endswith(told)
 
 
-def test_the_summary_is_the_same_in_a_few_fields() -> None:
+def test_the_summary_is_the_same_in_a_few_fields():
     state, (link,) = known(), CONFIG.links
     armed = replace(WELL, devices=MappingProxyType({"1/161": ARMED}))
     state = replace(

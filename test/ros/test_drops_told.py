@@ -1,7 +1,5 @@
 """Much that cannot be read on a link that works is a warning in diagnostics, and then over."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -30,7 +28,7 @@ class Line:
         return wire_task("node", wire, (), self.received, {}, self.dropped, for_others)
 
 
-def test_garbage_beside_what_works_is_a_warning_until_it_is_over() -> None:
+def test_garbage_beside_what_works_is_a_warning_until_it_is_over():
     line = Line()
     assert line.second(50).level == DiagnosticStatus.OK
     for _ in range(20):
@@ -43,14 +41,14 @@ def test_garbage_beside_what_works_is_a_warning_until_it_is_over() -> None:
     assert line.dropped["noise"] == 10000, "the count stays"
 
 
-def test_what_was_dropped_before_the_first_look_is_not_recent() -> None:
+def test_what_was_dropped_before_the_first_look_is_not_recent():
     line = Line()
     line.dropped = {"noise": 5000}
     assert line.second(5).level == DiagnosticStatus.OK
     assert line.second(50).level == DiagnosticStatus.OK
 
 
-def test_a_line_that_loses_some_is_none() -> None:
+def test_a_line_that_loses_some_is_none():
     line = Line()
     for _ in range(30):
         assert line.second(50, checksum=12).level == DiagnosticStatus.OK
@@ -63,7 +61,7 @@ def test_a_line_that_loses_some_is_none() -> None:
     assert few.second(1, checksum=3).level == DiagnosticStatus.WARN, "21 in ten seconds"
 
 
-def test_what_is_for_others_can_be_read() -> None:
+def test_what_is_for_others_can_be_read():
     line = Line()
     for _ in range(12):
         assert line.second(5, ("foreign",), foreign=500).level == DiagnosticStatus.OK
@@ -71,7 +69,7 @@ def test_what_is_for_others_can_be_read() -> None:
 
 
 @pytest.mark.parametrize("link", [mavlink, umbilical, upf])
-def test_the_reasons_that_count_as_read_are_those_that_are_counted(link) -> None:
+def test_the_reasons_that_count_as_read_are_those_that_are_counted(link):
     package = Path(chute_ros.__path__[0])
     folders = (Path(link.__file__).parent / "protocol", package / "protocol")
     sources = "".join(path.read_text() for one in folders for path in one.rglob("*.py"))

@@ -1,7 +1,5 @@
 """A node whose executor hangs falls silent towards its devices: nobody watches over them."""
 
-from __future__ import annotations
-
 import threading
 import time
 

@@ -1,7 +1,5 @@
 """Events from a link's thread to the executor: in order, none but pictures ever left out."""
 
-from __future__ import annotations
-
 import pytest
 
 from chute_ros.ros import inbox as inbox_module

@@ -1,7 +1,5 @@
 """Every topic and every field that a layout names exists in our messages."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import re

@@ -4,8 +4,6 @@ An attribute that covers one of rclpy's breaks it where nobody looks: rclpy and 
 `node.services`, `node._clock` and the like.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import textwrap

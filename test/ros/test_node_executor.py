@@ -1,7 +1,5 @@
 """The executor of our nodes: who is served, when, and what happens to those that wait."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The settings of every node: each field is checked as ROS is told, wherever it is set."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import fields, replace
@@ -60,16 +58,14 @@ def limits(one: Parameter) -> tuple[float, float]:
     return span.from_value, span.to_value
 
 
-def test_the_settings_of_the_nodes_are_all_looked_at() -> None:
+def test_the_settings_of_the_nodes_are_all_looked_at():
     assert (len(CLASSES) >= 20, len(NUMBERS) >= 150) == (True, True)
     known = {one.name for _, one in PLACES}
     assert known == {one.name for all_of_it in NODES.values() for one in all_of_it} | UNPREFIXED
 
 
 @every_number
-def test_a_number_just_outside_its_range_is_refused_by_its_name(
-    kind: type[Settings], one: Parameter
-) -> None:
+def test_a_number_just_outside_its_range_is_refused_by_its_name(kind, one):
     low, high = limits(one)
     wrong: list[float] = [low - 1, high + 1]
     if isinstance(one.default, float):
@@ -81,7 +77,7 @@ def test_a_number_just_outside_its_range_is_refused_by_its_name(
 
 
 @pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
-def test_so_it_is_where_the_field_is_set_in_python(kind: type[Settings]) -> None:
+def test_so_it_is_where_the_field_is_set_in_python(kind):
     for field in fields(kind):  # type: ignore[arg-type]
         one = field.metadata.get(Parameter)
         if one is None or type(one.default) not in (int, float):
@@ -92,9 +88,7 @@ def test_so_it_is_where_the_field_is_set_in_python(kind: type[Settings]) -> None
 
 
 @every_number
-def test_both_ends_of_the_range_that_ros_is_told_are_taken(
-    kind: type[Settings], one: Parameter
-) -> None:
+def test_both_ends_of_the_range_that_ros_is_told_are_taken(kind, one):
     for end in limits(one):
         said = refusal(kind, one, end)
         # Another that has its default may contradict it.
@@ -104,7 +98,7 @@ def test_both_ends_of_the_range_that_ros_is_told_are_taken(
 
 
 @pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
-def test_a_field_of_another_type_or_choice_is_refused_by_its_name(kind: type[Settings]) -> None:
+def test_a_field_of_another_type_or_choice_is_refused_by_its_name(kind):
     for one in parameters_of(kind):
         if not isinstance(one.default, (int, float)) or isinstance(one.default, bool):
             with pytest.raises(ParameterError, match=f"^parameter {one.name} is 7: need "):
@@ -115,7 +109,7 @@ def test_a_field_of_another_type_or_choice_is_refused_by_its_name(kind: type[Set
 
 
 @pytest.mark.parametrize("node", NODES)
-def test_every_parameter_has_a_meaning_and_every_number_a_range(node: str) -> None:
+def test_every_parameter_has_a_meaning_and_every_number_a_range(node):
     for one in NODES[node]:
         assert one.meaning, one.name
         assert one.meaning == one.meaning.strip(" .;"), one.name

@@ -1,7 +1,5 @@
 """Parameters: a bad value stops the start and is named; the file in config/ is all there is."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import re

@@ -1,7 +1,5 @@
 """Calls that order something of a device node are published, and that keeps none from its work."""
 
-from __future__ import annotations
-
 import inspect
 from typing import Any
 
@@ -15,7 +13,7 @@ from rcl_interfaces.srv import SetParameters
 from chute_ros.ros.person_requests import orders
 
 
-def test_every_service_orders_but_those_that_only_read() -> None:
+def test_every_service_orders_but_those_that_only_read():
     services = inspect.getmembers(chute_msgs.srv, lambda one: hasattr(one, "Request"))
     reading = {name for name, kind in services if not orders(kind)}
     assert reading == {
@@ -28,7 +26,7 @@ def test_every_service_orders_but_those_that_only_read() -> None:
     }
 
 
-def test_ros_own_services_order_nothing_of_a_device() -> None:
+def test_ros_own_services_order_nothing_of_a_device():
     assert not orders(SetParameters)
 
 
@@ -41,7 +39,7 @@ def told(bench: Any) -> list[PersonRequest]:
     return heard
 
 
-def test_what_only_reads_is_not_published_and_what_is_refused_is(bench: Any, told: Any) -> None:
+def test_what_only_reads_is_not_published_and_what_is_refused_is(bench, told):
     bench.call(GetInfo, "mavlink_parachute/get_info")
     bench.call(SetTriggers, "mavlink_parachute/set_triggers", arm=1, select=0)
     bench.until(lambda: len(told) == 2, "the second is published")
@@ -54,7 +52,7 @@ def test_what_only_reads_is_not_published_and_what_is_refused_is(bench: Any, tol
     assert "select from 1 to 255" in told[1].message
 
 
-def test_hostile_words_are_published_plainly_and_cut(bench: Any, told: Any) -> None:
+def test_hostile_words_are_published_plainly_and_cut(bench, told):
     hostile = "\x1b[2J\n" + "x" * 3000
     bench.call(SetTriggers, "mavlink_parachute/set_triggers", arm=1, select=0, device=hostile)
     bench.until(lambda: told, "it is published")
@@ -62,9 +60,7 @@ def test_hostile_words_are_published_plainly_and_cut(bench: Any, told: Any) -> N
     assert len(told[0].request) < 250
 
 
-def test_a_record_that_fails_keeps_no_service_from_its_work(
-    bench: Any, told: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_record_that_fails_keeps_no_service_from_its_work(bench, told, monkeypatch):
     log = bench.follow_log()
     node = next(one for one in bench.nodes if one.get_name() == "mavlink_parachute")
 

@@ -1,7 +1,5 @@
 """Control characters and line ends pass no border of a node: neither from ROS nor from a wire."""
 
-from __future__ import annotations
-
 import inspect
 from types import ModuleType
 from typing import Any
@@ -79,11 +77,11 @@ def is_plain(message: Any) -> bool:
 @pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)
 @settings(max_examples=20)
 @given(text=st.text(max_size=20) | st.text(st.sampled_from(sorted(FORBIDDEN)), min_size=1))
-def test_no_message_of_ours_keeps_any_control_character(kind: type, text: str) -> None:
+def test_no_message_of_ours_keeps_any_control_character(kind, text):
     assert is_plain(with_plain_texts(filled(kind(), text)))
 
 
-def test_texts_in_lists_of_messages_are_found() -> None:
+def test_texts_in_lists_of_messages_are_found():
     status = DiagnosticStatus(name=HOSTILE, values=[KeyValue(key=HOSTILE, value=HOSTILE)])
     assert is_plain(with_plain_texts(DiagnosticArray(status=[status])))
     rule = chute_msgs.msg.RuleState(name=HOSTILE, conditions=[HOSTILE])
@@ -116,7 +114,7 @@ def hostile_supervisor(bench: Any) -> Any:
     return node, heard
 
 
-def test_a_supervisor_among_hostile_ones_says_nothing_raw(bench: Any, capfd: Any) -> None:
+def test_a_supervisor_among_hostile_ones_says_nothing_raw(bench, capfd):
     _, heard = hostile_supervisor(bench)
     answers = [
         bench.call(Deploy, "safety/deploy", reason=HOSTILE),
@@ -133,7 +131,7 @@ def test_a_supervisor_among_hostile_ones_says_nothing_raw(bench: Any, capfd: Any
     assert "\nERROR" not in shown
 
 
-def test_a_hostile_node_on_the_can_bus_says_nothing_raw_through_us(bench: Any, capfd: Any) -> None:
+def test_a_hostile_node_on_the_can_bus_says_nothing_raw_through_us(bench, capfd):
     log, diagnostics = bench.follow_log(), bench.follow(DiagnosticArray, "/diagnostics")
     network = Network(bench)
     party = network.party(77)
@@ -154,7 +152,7 @@ def test_a_hostile_node_on_the_can_bus_says_nothing_raw_through_us(bench: Any, c
     assert not set("".join(capfd.readouterr())) & (FORBIDDEN - {"\n"})
 
 
-def test_each_line_of_a_log_is_one_place_in_the_source(bench: Any) -> None:
+def test_each_line_of_a_log_is_one_place_in_the_source(bench):
     """Given lines at two levels and with a throttle, which ROS tells apart by their place."""
     log = bench.follow_log()
     network = Network(bench)

@@ -1,7 +1,5 @@
 """Profiles by name and by path; what is wrong with one is said at the start."""
 
-from pathlib import Path
-
 import pytest
 from supervisor_bench import QUICK
 
@@ -15,27 +13,27 @@ SHIPPED = ("by_hand", "fixed_wing", "multirotor", "rocket")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_each_shipped_profile_is_there_by_its_name(name: str) -> None:
+def test_each_shipped_profile_is_there_by_its_name(name):
     profile = load_profile(name, LINKS)
     assert profile.name == name
     assert all(rule.says and rule.source for rule in profile.rules)
 
 
-def test_by_hand_deploys_nothing_by_itself() -> None:
+def test_by_hand_deploys_nothing_by_itself():
     assert all(rule.action.name != "DEPLOY" for rule in load_profile("by_hand", LINKS).rules)
 
 
-def test_a_name_that_is_none_says_which_there_are() -> None:
+def test_a_name_that_is_none_says_which_there_are():
     with pytest.raises(ParameterError, match="need one of by_hand, fixed_wing, multirotor"):
         load_profile("helicopter", LINKS)
 
 
-def test_an_empty_name_is_said_to_be_empty() -> None:
+def test_an_empty_name_is_said_to_be_empty():
     with pytest.raises(ParameterError, match=r"^parameter profile is empty: need one of by_hand"):
         load_profile("", LINKS)
 
 
-def test_a_mistake_in_a_file_stops_the_start_with_its_line(bench, tmp_path: Path) -> None:
+def test_a_mistake_in_a_file_stops_the_start_with_its_line(bench, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("profile: mine\nrules:\n  tilts:\n    action: FIRE\n")
     with pytest.raises(ProfileError, match="line 4: action of rule 'tilts' is 'FIRE'"):
@@ -46,7 +44,7 @@ def values(**given: object) -> dict[str, object]:
     return {parameter.name: parameter.default for parameter in PARAMETERS} | given
 
 
-def test_a_rule_that_can_never_be_fulfilled_is_named() -> None:
+def test_a_rule_that_can_never_be_fulfilled_is_named():
     config = config_from(values())
     assert blind_rules(config, ["vehicle/state"]) == ["autopilot lost and falling"]
     assert blind_rules(config, ["vehicle/state", "imu"]) == []
@@ -69,12 +67,12 @@ def test_a_rule_that_can_never_be_fulfilled_is_named() -> None:
         ),
     ],
 )
-def test_a_wrong_parameter_names_itself_and_the_fix(given: dict[str, object], words: str) -> None:
+def test_a_wrong_parameter_names_itself_and_the_fix(given, words):
     with pytest.raises(ParameterError, match=words):
         config_from(values(**given))
 
 
-def test_single_links_have_limits_of_their_own() -> None:
+def test_single_links_have_limits_of_their_own():
     config = config_from(values(link_limits=["mavlink_parachute lost_after=3 startup_grace=20"]))
     assert config.limits("mavlink_parachute").lost_after == 3.0
     assert config.limits("mavlink_parachute").stale_after == 0.5

@@ -1,7 +1,5 @@
 """Why a device is not healthy is in its node's heartbeat; trouble of a wire is told once."""
 
-from __future__ import annotations
-
 from chute_msgs.msg import LinkHeartbeat
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

@@ -3,8 +3,6 @@
 The words in which its core explains itself are the business of test/supervisor.
 """
 
-from __future__ import annotations
-
 import pytest
 from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyRequest, SafetyState
 from chute_msgs.srv import Arm, Deploy, Kill, SetMode
@@ -46,29 +44,43 @@ def test_healthy_links_release_flight_and_the_state_says_why(ready):
     assert state.link_ages[0] < 20.0
 
 
-def test_a_link_that_was_never_heard_blocks_flight(bench):
+def test_one_that_hears_nobody_beats_by_itself_and_blocks_flight(bench):
     states = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     bench.add(SafetySupervisorNode, **QUICK)
     bench.until(lambda: states and states[-1].state == SafetyState.BLOCKED, "flight is blocked")
     assert states[-1].flight_blocked
     assert "mavlink_parachute" in states[-1].block_reasons[0]
     assert states[-1].link_ages[0] != states[-1].link_ages[0], "never heard is NaN"
+    bench.until(lambda: len(beats) >= 10, "it beats")
+    assert all(beat.supervisor for beat in beats)
+    assert {beat.link for beat in beats} == {"safety_supervisor"}
+    numbers = [beat.seq for beat in beats]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
-@pytest.mark.parametrize("why", ["device unhealthy", "device lost", "node silent"])
-def test_what_becomes_unhealthy_blocks_and_what_recovers_releases(ready, why):
-    if why == "device unhealthy":
-        ready.link.healthy = False
-    elif why == "device lost":
-        ready.link.state = LinkState.LOST
-    else:
-        ready.link.beating = False
-    state = ready.await_stage(SafetyState.BLOCKED)
-    assert state.flight_blocked
-    assert state.block_reasons
-    ready.await_decision(Action.FLIGHT_BLOCK)
-    ready.link.healthy, ready.link.state, ready.link.beating = True, LinkState.OK, True
-    ready.await_stage(SafetyState.READY)
+def test_what_becomes_unhealthy_blocks_and_what_recovers_releases(ready):
+    """And its diagnostics follow."""
+    said, link = ready.bench.follow(DiagnosticArray, "/diagnostics"), ready.link
+
+    def level():
+        own = [s for s in said[-1].status if "/safety_supervisor: " in s.name] if said else []
+        # That others can reach a middleware that is not cured is no matter of its health.
+        return {s.level for s in own if not s.name.endswith(": middleware")}
+
+    for name, wrong in (("healthy", False), ("state", LinkState.LOST), ("beating", False)):
+        ready.bench.until(lambda: level() == {DiagnosticStatus.OK}, "it is well")
+        decided, well = len(ready.decided(Action.FLIGHT_BLOCK)), getattr(link, name)
+        setattr(link, name, wrong)
+        state = ready.await_stage(SafetyState.BLOCKED)
+        assert state.flight_blocked, name
+        assert state.block_reasons, name
+        ready.bench.until(
+            lambda known=decided: len(ready.decided(Action.FLIGHT_BLOCK)) > known, "it is decided"
+        )
+        ready.bench.until(lambda: level() and level() != {DiagnosticStatus.OK}, "it is not well")
+        setattr(link, name, well)
+        ready.await_stage(SafetyState.READY)
 
 
 # For whoever comes late
@@ -163,58 +175,29 @@ def test_what_no_device_may_ask_for_is_logged_once_for_each_link_and_nothing_els
     assert "another 33 requests 4: " in said[1]
 
 
-# Its own heartbeat and diagnostics
-
-
-def test_it_beats_by_itself_and_numbers_its_beats(bench):
-    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-    bench.add(SafetySupervisorNode)
-    bench.until(lambda: len(beats) >= 10, "it beats")
-    assert all(beat.supervisor for beat in beats)
-    assert {beat.link for beat in beats} == {"safety_supervisor"}
-    numbers = [beat.seq for beat in beats]
-    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-
-
-def test_its_diagnostics_follow_its_health(ready):
-    said = ready.bench.follow(DiagnosticArray, "/diagnostics")
-
-    def level():
-        own = [s for s in said[-1].status if "/safety_supervisor: " in s.name] if said else []
-        # That others can reach a middleware that is not cured is no matter of its health.
-        return {s.level for s in own if not s.name.endswith(": middleware")}
-
-    ready.bench.until(lambda: level() == {DiagnosticStatus.OK}, "it is well")
-    ready.link.healthy = False
-    ready.bench.until(lambda: level() and level() != {DiagnosticStatus.OK}, "it is not well")
-
-
 # Arm
 
 
-def test_arm_goes_to_the_device_node_and_back(ready):
-    answer = ready.call(Arm, "arm", arm=True, triggers=4)
-    assert answer.success, answer.message
-    assert ready.link.arm_requests == [(True, 4)]
-    ready.await_stage(SafetyState.ARMED)
-    assert ready.call(Arm, "arm", arm=False).success
-    assert ready.link.arm_requests[1:] == [(False, 0)]
-    ready.await_stage(SafetyState.READY)
-
-
-def test_arm_fails_where_the_device_node_fails(ready):
-    ready.link.arm_succeeds = False
-    answer = ready.call(Arm, "arm", arm=True)
-    assert not answer.success
-    assert "mavlink_parachute: as told" in answer.message
-    assert ready.states[-1].state == SafetyState.READY
-
-
-def test_arm_fails_where_the_device_nodes_service_is_missing(scene):
+def test_arm_goes_to_the_device_node_and_back_and_fails_where_it_fails(scene):
     scene.await_stage(SafetyState.READY)
     answer = scene.call(Arm, "arm", arm=True)
     assert not answer.success
     assert "mavlink_parachute/arm is not there" in answer.message
+    scene.link.offer_arming()
+    client = scene.supervisor._arm_clients["mavlink_parachute"]
+    scene.bench.until(client.service_is_ready, "its service is there")
+    scene.link.arm_succeeds = False
+    answer = scene.call(Arm, "arm", arm=True)
+    assert not answer.success
+    assert "mavlink_parachute: as told" in answer.message
+    assert scene.states[-1].state == SafetyState.READY
+    scene.link.arm_succeeds = True
+    answer = scene.call(Arm, "arm", arm=True, triggers=4)
+    assert answer.success, answer.message
+    scene.await_stage(SafetyState.ARMED)
+    assert scene.call(Arm, "arm", arm=False).success
+    assert scene.link.arm_requests[1:] == [(True, 4), (False, 0)]
+    scene.await_stage(SafetyState.READY)
 
 
 def test_arm_is_refused_while_flight_is_blocked(ready):
@@ -229,22 +212,32 @@ def test_arm_is_refused_while_flight_is_blocked(ready):
 # Kill and deploy
 
 
-def test_kill_is_carried_through_to_its_confirmation(ready):
-    answer = ready.call(Kill, "kill", reason="a test")
-    assert (answer.success, answer.accepted) == (True, True), answer.message
-    (kill,) = ready.decided(Action.KILL)
-    assert kill.targets == ["mavlink_parachute"]
-    assert any("a test" in reason for reason in kill.reasons)
-
-
-def test_a_kill_that_fails_is_answered_so(ready):
+def test_a_kill_is_answered_as_it_ends_and_sent_again_until_somebody_reports(ready):
     ready.link.outcomes = [Outcome.SENT, Outcome.FAILED]
     answer = ready.call(Kill, "kill", reason="a test")
     assert not answer.success
     assert answer.message
+    ready.link.outcomes = []
+    future = ready.bench.ask(Kill, "safety/kill", reason="another test")
+
+    def sent():
+        found = ready.decided(Action.KILL)[1:]
+        return found and sum(d.id == found[0].id for d in ready.decisions) >= 3 and found
+
+    (kill,) = ready.bench.until(sent, "it is sent again with its number")
+    assert kill.targets == ["mavlink_parachute"]
+    assert any("another test" in reason for reason in kill.reasons)
+    ready.link.report_newest(Action.KILL, Outcome.CONFIRMED)
+    ready.bench.until(future.done, "it is answered")
+    answer = future.result()
+    assert (answer.success, answer.accepted) == (True, True), answer.message
 
 
-def test_deploy_goes_after_the_kill_and_only_after_it(ready):
+def test_a_deploy_goes_after_the_kill_on_the_ground_only_with_force_until_a_reset(ready):
+    answer = ready.call(Deploy, "deploy", reason="a slip")
+    assert not answer.success
+    assert answer.message
+    assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
     answer = ready.call(Deploy, "deploy", force=True, reason="a test")
     assert (answer.success, answer.accepted) == (True, True), answer.message
     (kill,), (deploy,) = ready.decided(Action.KILL), ready.decided(Action.DEPLOY)
@@ -252,13 +245,9 @@ def test_deploy_goes_after_the_kill_and_only_after_it(ready):
     # Each may be sent again until a report of it comes.
     assert ready.decisions.index(kill) < ready.decisions.index(deploy)
     ready.await_stage(SafetyState.DEPLOYED)
-
-
-def test_deploy_on_the_ground_needs_force(ready):
-    answer = ready.call(Deploy, "deploy", reason="a slip")
-    assert not answer.success
-    assert answer.message
-    assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
+    answer = ready.call(Trigger, "reset")
+    assert answer.success, answer.message
+    ready.await_stage(SafetyState.READY)
 
 
 def test_a_deploy_that_nobody_confirms_is_answered_so(ready):
@@ -267,15 +256,6 @@ def test_a_deploy_that_nobody_confirms_is_answered_so(ready):
     assert not answer.success
     ready.await_stage(SafetyState.FAULT)
     assert ready.states[-1].alarms
-
-
-def test_a_decision_that_nobody_reports_on_is_sent_again_with_its_number(ready):
-    ready.link.outcomes = []
-    ready.bench.ask(Kill, "safety/kill", reason="a test")
-    ready.bench.until(
-        lambda: sum(d.action == Action.KILL for d in ready.decisions) >= 3, "it is sent again"
-    )
-    assert len(ready.decided(Action.KILL)) == 1
 
 
 def test_after_a_restart_of_the_supervisor_its_epoch_is_higher(ready):
@@ -288,38 +268,27 @@ def test_after_a_restart_of_the_supervisor_its_epoch_is_higher(ready):
     assert again.runtime.state.epoch > 0
 
 
-# Reset and modes
+# Modes
 
 
-def test_reset_goes_back_to_the_start(ready):
-    ready.call(Deploy, "deploy", force=True, reason="a test")
-    ready.await_stage(SafetyState.DEPLOYED)
-    answer = ready.call(Trigger, "reset")
-    assert answer.success, answer.message
-    ready.await_stage(SafetyState.READY)
-
-
-def test_in_shadow_it_says_and_does_not_do(ready):
-    assert ready.call(SetMode, "set_mode", mode=1, reason="a test").success
-    answer = ready.call(Kill, "kill", reason="a test")
+def test_in_shadow_it_says_and_does_not_do_and_inhibited_neither(ready, capfd):
+    """What a person asks for is in the log, whatever came of it."""
+    capfd.readouterr()
+    answer = ready.call(SetMode, "set_mode", mode=9)
     assert not answer.success
+    assert "mode 9: need ACTIVE 0, SHADOW 1 or INHIBITED 2" in answer.message
+    assert ready.states[-1].mode == SafetyState.ACTIVE
+    assert ready.call(SetMode, "set_mode", mode=1, reason="a test").success
+    assert not ready.call(Kill, "kill", reason="a test").success
     assert all(d.shadow for d in ready.decided(Action.KILL))
     ready.bench.until(lambda: ready.states[-1].mode == SafetyState.SHADOW, "it says its mode")
     assert ready.call(SetMode, "set_mode", mode=0).success
-
-
-def test_inhibited_it_does_nothing(ready):
     assert ready.call(SetMode, "set_mode", mode=2, reason="a test").success
-    assert not ready.call(Deploy, "deploy", force=True, reason="a test").success
+    ready.decisions.clear()
+    assert not ready.call(Deploy, "deploy", force=True, reason="it looks odd").success
     assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
-
-
-def test_what_a_person_asks_for_is_in_the_log_whatever_came_of_it(ready, capfd):
-    capfd.readouterr()
-    ready.call(Deploy, "deploy", reason="it looks odd")
-    ready.call(SetMode, "set_mode", mode=2, reason="a test")
     log = capfd.readouterr().err
-    assert "safety/deploy(force=False, reason='it looks odd') answered: refused: " in log
+    assert "safety/deploy(force=True, reason='it looks odd') answered: refused: " in log
     assert "safety/set_mode(mode=2, force=False, reason='a test') answered: mode INHIBITED" in log
 
 
@@ -342,10 +311,3 @@ def test_a_mode_in_which_nobody_is_protected_does_not_look_well(bench, capfd, mo
 
     bench.until(lambda: decisions() and decisions()[-1].message == f"{meaning}; READY", "it says")
     assert decisions()[-1].level == DiagnosticStatus.WARN
-
-
-def test_a_mode_that_is_none_is_refused_in_words(ready):
-    answer = ready.call(SetMode, "set_mode", mode=9)
-    assert not answer.success
-    assert "mode 9: need ACTIVE 0, SHADOW 1 or INHIBITED 2" in answer.message
-    assert ready.states[-1].mode == SafetyState.ACTIVE

@@ -1,7 +1,5 @@
 """No node and no launch file starts on settings that nobody gave: one line, and exit code 2."""
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 import os
@@ -9,18 +7,14 @@ import subprocess
 import sys
 import tempfile
 from functools import partial
-from pathlib import Path
 
 import pytest
 from launch_files import LAUNCH, Recorded, made_by
 from starts import starts
 
 from chute_ros.errors import ParameterError
-from chute_ros.links.registered import module_of
 from chute_ros.ros.parameter_file import files_of, given_in, taken
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
-
-ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
 
 
 @pytest.fixture(autouse=True)
@@ -30,17 +24,11 @@ def _folder(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
 
 
-def start(node: str, *arguments: str) -> tuple[int, list[str]]:
-    """A node that is not to start: its exit code and what it said."""
-    done = subprocess.run(
-        [sys.executable, "-m", module_of(node), "--ros-args", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert done.stdout == ""
-    return done.returncode, done.stderr.splitlines()
+def refused_starts(node: str, *cases: list[str]) -> list[list[str]]:
+    """What a node says of each of these arguments, none of which is to start it: its lines."""
+    told = starts(node, *cases)
+    assert [(code, out) for code, out, _ in told] == [(2, "")] * len(cases), told
+    return [err.splitlines() for _, _, err in told]
 
 
 #: Arguments, and what is told of them.
@@ -67,9 +55,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("node", ["upf_can", "safety_supervisor"])
-def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
-    node: str, tmp_path: Path
-) -> None:
+def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(node, tmp_path):
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "broken.yaml").write_text("upf_can: [")
     (tmp_path / "unknown.yaml").write_text(f"/**/{node}:\n  ros__parameters:\n    url: x\n")
@@ -78,62 +64,55 @@ def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
         ["--ros-args", *(one.replace("FOLDER", str(tmp_path)) for one in arguments)]
         for arguments, _ in REFUSED
     ]
-    for arguments, (_, words), told in zip(given, REFUSED, starts(node, *given), strict=True):
-        code, out, err = told
-        assert (code, out) == (2, ""), (arguments, told)
-        (line,) = err.splitlines()
+    told = refused_starts(node, *given)
+    for arguments, (_, words), (line,) in zip(given, REFUSED, told, strict=True):
         assert line.startswith(f"{node}: "), arguments
         assert words in line, arguments
 
 
-def test_a_namespace_that_ros_cannot_read_is_told_with_the_fix() -> None:
-    code, (*_of_ros, line) = start("upf_can", "-r", "__ns:=/drone-1")
-    assert code == 2
-    assert line == (
+def test_a_name_that_does_not_fit_its_namespace_is_told_with_the_fix(tmp_path):
+    path = tmp_path / "settings.yaml"
+    path.write_text("upf_can:\n  ros__parameters:\n    call_tries: 4\n")
+    (*_of_ros, unreadable), (rooted,), (named,) = refused_starts(
+        "upf_can",
+        ["--ros-args", "-r", "__ns:=/drone-1"],
+        ["--ros-args", "--params-file", str(path), "-r", "__ns:=/drone1"],
+        ["--ros-args", "-p", "upf_can:call_tries:=4", "-r", "__ns:=/drone1"],
+    )
+    assert unreadable == (
         "upf_can: Failed to parse ROS arguments: Couldn't parse remap rule: '-r __ns:=/drone-1': "
         "need OLD:=NEW, names of letters, digits and _ alone, a namespace with / before it"
     )
-
-
-def test_a_setting_that_ros_would_take_for_a_new_name_of_topics_is_told() -> None:
-    code, (line,) = start("safety_supervisor", "-r", "mode:=SHADOW")
-    assert (code, line) == (
-        2,
-        "safety_supervisor: '-r mode:=SHADOW' gives topics another name: mode is set by '-p'",
+    assert rooted == (
+        f"upf_can: {path} has no ros__parameters for /drone1/upf_can (it has some for /upf_can): "
+        "need for example '/**/upf_can:' with 'ros__parameters:' below"
     )
-    code, (line, usage) = start("safety_supervisor", "--", "mode:=SHADOW")
-    assert code == 2
-    assert line == (
+    # ROS knows no namespace there.
+    assert named == (
+        "upf_can: '-p upf_can:call_tries:=4' is for a node /upf_can, this one is /drone1/upf_can: "
+        "leave 'upf_can:' out"
+    )
+
+
+def test_a_setting_that_is_given_as_something_else_is_told():
+    (renames,), (unknown, usage) = refused_starts(
+        "safety_supervisor",
+        ["--ros-args", "-r", "mode:=SHADOW"],
+        ["--ros-args", "--", "mode:=SHADOW"],
+    )
+    assert renames == (
+        "safety_supervisor: '-r mode:=SHADOW' gives topics another name: mode is set by '-p'"
+    )
+    assert unknown == (
         "safety_supervisor: unknown argument mode:=SHADOW: the settings of a node follow "
         "--ros-args"
     )
     assert "[-p PARAMETER:=VALUE]" in usage
 
 
-def test_a_name_without_its_namespace_is_told_with_the_fix(tmp_path: Path) -> None:
-    path = tmp_path / "settings.yaml"
-    path.write_text(ROOTED)
-    code, (line,) = start("upf_can", "--params-file", str(path), "-r", "__ns:=/drone1")
-    assert code == 2
-    assert line == (
-        f"upf_can: {path} has no ros__parameters for /drone1/upf_can (it has some for /upf_can): "
-        "need for example '/**/upf_can:' with 'ros__parameters:' below"
-    )
-
-
-def test_a_node_named_without_its_namespace_gets_no_parameter_and_it_is_told() -> None:
-    """ROS knows no namespace there."""
-    code, (line,) = start("upf_can", "-p", "upf_can:call_tries:=4", "-r", "__ns:=/drone1")
-    assert code == 2
-    assert line == (
-        "upf_can: '-p upf_can:call_tries:=4' is for a node /upf_can, this one is /drone1/upf_can: "
-        "leave 'upf_can:' out"
-    )
-
-
 def test_what_a_file_has_for_others_or_for_all_and_what_is_ros_own_does_not_stop_a_start(
-    bench, tmp_path: Path, capfd
-) -> None:
+    bench, tmp_path, capfd
+):
     path = tmp_path / "settings.yaml"
     path.write_text(
         "/**/safety_supervisor:\n  ros__parameters:\n    mode: SHADOW\n    use_sim_time: false\n"
@@ -150,7 +129,7 @@ def test_what_a_file_has_for_others_or_for_all_and_what_is_ros_own_does_not_stop
     assert "url" not in told
 
 
-def test_what_a_node_takes_from_where_is_told(tmp_path: Path) -> None:
+def test_what_a_node_takes_from_where_is_told(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
     first.write_text("/**/upf_can:\n  ros__parameters:\n    b: 1\n    c: 1\n    foreign: 2\n")
     second.write_text("/**:\n  ros__parameters:\n    c: 2\n    nested:\n      d: 3\n")
@@ -179,7 +158,7 @@ def test_what_a_node_takes_from_where_is_told(tmp_path: Path) -> None:
         ("/**/upf", False),
     ],
 )
-def test_names_of_nodes_count_as_with_ros(name: str, found: bool, tmp_path: Path) -> None:
+def test_names_of_nodes_count_as_with_ros(name, found, tmp_path):
     path = tmp_path / "settings.yaml"
     path.write_text(f"{name}:\n  ros__parameters:\n    a: 1\n")
     if found:
@@ -199,9 +178,7 @@ def test_names_of_nodes_count_as_with_ros(name: str, found: bool, tmp_path: Path
         ("a: 1\n    a: 2", "line 4: a is there twice: leave one of them"),
     ],
 )
-def test_a_value_that_yaml_reads_as_another_is_refused_where_it_is_ours(
-    line: str, told: str, tmp_path: Path
-) -> None:
+def test_a_value_that_yaml_reads_as_another_is_refused_where_it_is_ours(line, told, tmp_path):
     """Other nodes' sections are their own matter."""
     path = tmp_path / "settings.yaml"
     section = f"  ros__parameters:\n    {line}\n"
@@ -258,8 +235,8 @@ def refused(monkeypatch, capsys, file: str, **arguments: str) -> str:
     ],
 )
 def test_a_vehicle_does_not_start_with_a_file_that_is_not_all_for_it(
-    text: str | None, words: str, tmp_path: Path, monkeypatch, capsys
-) -> None:
+    text, words, tmp_path, monkeypatch, capsys
+):
     path = tmp_path / "settings.yaml"
     if text is not None:
         path.write_text(text)
@@ -282,16 +259,16 @@ def test_a_vehicle_does_not_start_with_a_file_that_is_not_all_for_it(
     ],
 )
 def test_a_connection_that_no_node_would_take_is_told_by_the_launch_file(
-    parachute: str, argument: str, value: str, words: str, monkeypatch, capsys
-) -> None:
+    parachute, argument, value, words, monkeypatch, capsys
+):
     line = refused(monkeypatch, capsys, VEHICLE, parachute=parachute, **{argument: value})
     assert line.startswith(f"launch argument {argument}: ")
     assert words in line
 
 
 def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
-    tmp_path: Path, monkeypatch, capsys
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     path = tmp_path / "settings.yaml"
     path.write_text(GOOD.format("connection: to be filled in"))
     given = {"parachute": "mavlink", "config": str(path)}
@@ -302,8 +279,8 @@ def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
 
 
 def test_a_profile_that_no_supervisor_would_take_is_told_before_anything_starts(
-    tmp_path: Path, monkeypatch, capsys
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     path = tmp_path / "settings.yaml"
     path.write_text(
         GOOD.format("connection: udpin:0.0.0.0:1").replace("mode: SHADOW", "profile: by_hnd")
@@ -315,7 +292,7 @@ def test_a_profile_that_no_supervisor_would_take_is_told_before_anything_starts(
     )
 
 
-def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
+def test_with_a_file_that_is_for_it_it_starts(tmp_path, monkeypatch):
     path = tmp_path / "settings.yaml"
     path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))
     given = {"parachute": "mavlink", "namespace": "drone1", "config": str(path)}
@@ -331,9 +308,7 @@ def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> No
         (SIMULATION, "parachut", "parachute"),
     ],
 )
-def test_a_launch_argument_that_is_misspelt_is_told(
-    file: str, name: str, meant: str, monkeypatch, capsys
-) -> None:
+def test_a_launch_argument_that_is_misspelt_is_told(file, name, meant, monkeypatch, capsys):
     foreign = {"launched": "/parent.launch.py", "somebody_elses": "too", "parachute": "mavlink"}
     told = f"there is no launch argument {name}: did you mean {meant}?"
     assert refused(monkeypatch, capsys, file, **{name: "given"}) == told
@@ -344,8 +319,8 @@ def test_a_launch_argument_that_is_misspelt_is_told(
 @pytest.mark.parametrize("file", [VEHICLE, SIMULATION])
 @pytest.mark.parametrize("name", ["configs", "namespaces", "connections", "ports"])
 def test_an_argument_that_an_including_file_declares_is_its_own_however_like_one_of_ours(
-    file: str, name: str, monkeypatch
-) -> None:
+    file, name, monkeypatch
+):
     theirs = {"launched": "/fleet.launch.py", "declares": [name], name: "their own"}
     assert nodes_of(made_by(LAUNCH / file, monkeypatch, **theirs, parachute="mavlink"))
 
@@ -360,8 +335,8 @@ def test_an_argument_that_an_including_file_declares_is_its_own_however_like_one
     ],
 )
 def test_a_file_for_a_whole_name_is_for_the_node_in_the_namespace_that_was_pushed(
-    pushed: str, namespace: str, place: str, tmp_path: Path, monkeypatch, capsys
-) -> None:
+    pushed, namespace, place, tmp_path, monkeypatch, capsys
+):
     """As PushRosNamespace does it, in an including launch file."""
     given = {"parachute": "mavlink", "namespace": namespace, "pushed": pushed}
     path = tmp_path / "settings.yaml"
@@ -379,19 +354,19 @@ def test_a_file_for_a_whole_name_is_for_the_node_in_the_namespace_that_was_pushe
     "name", ["config_file", "params_file", "conn", "ns", "cfg", "use_sim_time", "x"]
 )
 def test_a_launch_argument_that_it_does_not_have_is_told_with_those_it_has(
-    file: str, name: str, monkeypatch, capsys
-) -> None:
+    file, name, monkeypatch, capsys
+):
     line = refused(monkeypatch, capsys, file, **{name: "given"})
     assert line.startswith(f"there is no launch argument {name}: need one of ")
     assert {"namespace", "parachute"} < {one.strip(",") for one in line.split()}
 
 
-def test_capitals_do_not_hide_what_was_meant(monkeypatch, capsys) -> None:
+def test_capitals_do_not_hide_what_was_meant(monkeypatch, capsys):
     line = refused(monkeypatch, capsys, VEHICLE, CONFIG="my.yaml")
     assert line == "there is no launch argument CONFIG: did you mean config?"
 
 
-def test_what_ros2_launch_adds_for_its_own_options_is_let_by(monkeypatch) -> None:
+def test_what_ros2_launch_adds_for_its_own_options_is_let_by(monkeypatch):
     given = {"parachute": "mavlink", "launch-prefix": "gdb", "launch-prefix-filter": "x"}
     assert nodes_of(made_by(LAUNCH / VEHICLE, monkeypatch, **given))
 
@@ -406,8 +381,8 @@ def test_what_ros2_launch_adds_for_its_own_options_is_let_by(monkeypatch) -> Non
     ],
 )
 def test_the_argument_of_a_link_that_is_not_started_is_told_with_the_fix(
-    parachute: str, argument: str, node: str, fits: str, monkeypatch, capsys
-) -> None:
+    parachute, argument, node, fits, monkeypatch, capsys
+):
     """The vehicle would start without its parachute, on the defaults of another link."""
     given = {"parachute": parachute, argument: "socketcan:can0"}
     line = refused(monkeypatch, capsys, VEHICLE, **given)
@@ -422,7 +397,7 @@ def test_the_argument_of_a_link_that_is_not_started_is_told_with_the_fix(
 if importlib.util.find_spec("launch.actions"):  # where ROS is installed; there is no wheel of it
 
     @pytest.mark.parametrize("argument", ["ns:=drone1", "bus:=socketcan:can0"])
-    def test_the_real_launch_ends_with_the_line(argument: str) -> None:
+    def test_the_real_launch_ends_with_the_line(argument):
         """As `ros2 launch` does it."""
         done = subprocess.run(
             [sys.executable, "-c", AS_ROS2_LAUNCH, str(LAUNCH / VEHICLE), argument],
@@ -437,7 +412,7 @@ if importlib.util.find_spec("launch.actions"):  # where ROS is installed; there 
 
 
 @pytest.mark.parametrize("port", ["abc", "", "0", "65534", "-1", "1.5"])
-def test_a_port_that_is_none_is_told(port: str, monkeypatch, capsys) -> None:
+def test_a_port_that_is_none_is_told(port, monkeypatch, capsys):
     line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", port=port)
     assert line == f"port is {port!r}: need a whole number from 1 to 65533"
 
@@ -450,7 +425,7 @@ def flown(monkeypatch, **arguments: str) -> list[str]:
 
 
 @pytest.mark.parametrize("parachute", ["mavlink", "upf", "relay"])
-def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch) -> None:
+def test_a_simulation_flies_and_fails_as_it_is_told(parachute, monkeypatch):
     assert flown(monkeypatch, parachute=parachute) == ["0:wind=0.5"]
     start = ["10:arm", "11:takeoff=60", "0:wind=0.5"]
     assert flown(monkeypatch, parachute=parachute, fly="60") == start
@@ -472,14 +447,12 @@ def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch)
         ("60", "motor@nan", "fail is 'motor@nan': need one of"),
     ],
 )
-def test_a_flight_that_cannot_be_flown_is_told(
-    fly: str, fail: str, words: str, monkeypatch, capsys
-) -> None:
+def test_a_flight_that_cannot_be_flown_is_told(fly, fail, words, monkeypatch, capsys):
     line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", fly=fly, fail=fail)
     assert line.startswith(words)
 
 
-def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys) -> None:
+def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys):
     line = refused(monkeypatch, capsys, SIMULATION, parachute="umbilical", fly="60")
     words = "need a vehicle with sim_autopilot; this one has sim_flight_computer"
     assert line == f"fly is '60': {words}"

@@ -1,7 +1,5 @@
 """Stamps tell when something was received, not when its node last spoke of it."""
 
-from __future__ import annotations
-
 import math
 import time
 
@@ -15,17 +13,17 @@ from chute_ros.ros.two_clocks import wall_at
 NOW = Time(sec=1_780_000_000, nanosec=250_000_000)
 
 
-def test_a_stamp_of_before() -> None:
+def test_a_stamp_of_before():
     assert before(NOW, 0.5) == Time(sec=1_779_999_999, nanosec=750_000_000)
 
 
-def test_the_picture_of_a_vehicle_has_the_stamp_of_its_newest_part() -> None:
+def test_the_picture_of_a_vehicle_has_the_stamp_of_its_newest_part():
     message = vehicle_state(VehicleState(height=60.0, height_age=7.0, armed_age=3.0), NOW)
     assert seconds(message.header.stamp) == pytest.approx(seconds(NOW) - 3.0)
     assert message.height_age == 7.0
 
 
-def test_a_vehicle_of_which_nothing_was_received_has_no_stamp() -> None:
+def test_a_vehicle_of_which_nothing_was_received_has_no_stamp():
     assert vehicle_state(VehicleState(), NOW).header.stamp == Time()
 
 
@@ -55,24 +53,24 @@ class Processor:
 
 
 @pytest.mark.parametrize("away", [(), (0,), (1,), (2,), (3,), (1, 4, 8), tuple(range(1, 28))])
-def test_a_busy_processor_moves_no_stamp(away: tuple[int, ...]) -> None:
+def test_a_busy_processor_moves_no_stamp(away):
     """Something was received at 49.9 s, whenever the processor is away meanwhile."""
     processor = Processor(*away)
     stamp = wall_at(49.9, processor.monotonic, processor.wall)
     assert stamp == pytest.approx(49_900_000_000 + AHEAD, abs=100_000)
 
 
-def test_of_a_processor_that_is_always_away_the_best_is_taken() -> None:
+def test_of_a_processor_that_is_always_away_the_best_is_taken():
     processor = Processor(*range(1000))
     stamp = wall_at(49.9, processor.monotonic, processor.wall)
     assert stamp == pytest.approx(49_900_000_000 + AHEAD, abs=12_000_000)
 
 
-def test_what_was_never_received_has_no_stamp_and_none_is_before_the_clocks_zero() -> None:
+def test_what_was_never_received_has_no_stamp_and_none_is_before_the_clocks_zero():
     assert wall_at(math.nan) == 0
     assert wall_at(-1e12) == 0
 
 
-def test_the_clocks_of_this_machine() -> None:
+def test_the_clocks_of_this_machine():
     before_, at, after = time.time_ns(), wall_at(time.monotonic()), time.time_ns()
     assert before_ - 1_000_000 <= at <= after + 1_000_000

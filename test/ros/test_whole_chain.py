@@ -1,7 +1,5 @@
 """Supervisor, mavlink_parachute and both simulators together: one flight, seen from the wire."""
 
-from __future__ import annotations
-
 import pytest
 from chute_msgs.msg import ParachuteStatus, SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy

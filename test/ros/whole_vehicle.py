@@ -1,7 +1,5 @@
 """A vehicle with a node of every kind and, where one can be simulated quickly, its device."""
 
-from __future__ import annotations
-
 import upf_bench
 from mavlink_bench import Autopilot, Module, Network
 from node_bench import Bench
