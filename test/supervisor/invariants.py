@@ -61,7 +61,11 @@ class Watch:
         self.forced = False
 
     def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
-        """A rule that is not looked at, as nothing has changed, would be what it was."""
+        """A rule that is not looked at, as nothing has changed, would be what it was. Where the
+        vehicle tells something, or time alone may have changed it, each is looked at anyhow."""
+        told = any(isinstance(one, i.VehicleReport) for one in inputs)
+        if told or self.now >= before.own.vehicle_rests_until:
+            return
         looked_at = replace(before, own=replace(before.own, vehicle_rests_until=-math.inf))
         state, outputs = update(self.config, looked_at, inputs, self.now)
         until = state.own.vehicle_rests_until
@@ -175,7 +179,9 @@ class Watch:
                 assert evidence.latched or evidence.denied, "fulfilled, and nothing follows"
             newly = evidence.latched and not before.rule(rule.name).latched
             if newly and before.stage is Stage.IN_FLIGHT:
-                assert K in done, "acted on, and no kill has left"
+                kill = before.killing.kill
+                under_way = kill is not None and not kill.confirmed and not kill.given_up
+                assert K in done or under_way, "acted on, and no kill has left"
 
     def _rule_may_deploy(self, before: State) -> None:
         """Not on silence alone, not on the ground, not disarmed, not too low."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from dataclasses import dataclass, field, fields, replace
@@ -200,6 +201,12 @@ class Story:
                 break
             self._update((), wake)
         return self._update(inputs, t)
+
+    def fork(self) -> Story:
+        """Another story that goes on from here."""
+        other = copy.copy(self)
+        other.turns, other.outputs = [*self.turns], [*self.outputs]
+        return other
 
     def _update(self, inputs: tuple[i.Input, ...], t: float) -> list[i.Output]:
         self.t = t

@@ -1,8 +1,6 @@
 """Air that flows moves the pressure in a housing: by airspeed, and by propellers. Neither
 ends a flight that goes well, nor hides a fall."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -23,9 +21,7 @@ def too_low(error: float, airspeed: float) -> float:
 
 
 @pytest.mark.parametrize(("error", "airspeed"), combinations(ERRORS, [16.0, 22.0, 25.0]))
-def test_a_multirotor_that_leans_far_and_flies_level_is_not_ended(
-    error: float, airspeed: float
-) -> None:
+def test_a_multirotor_that_leans_far_and_flies_level_is_not_ended(error, airspeed):
     """Given 63 degrees for a dash, and again to stop; as in ACRO nobody tells a target."""
     teller, fast = up("multirotor"), 0.0
     pushed = 0.6 * GRAVITY * math.tan(math.radians(63.0))  # the rest is for the drag
@@ -41,7 +37,7 @@ def test_a_multirotor_that_leans_far_and_flies_level_is_not_ended(
 
 
 @pytest.mark.parametrize("washed", [0.0, 3.0, 6.0, 9.0])
-def test_a_barometer_that_leaves_the_wash_of_its_propellers_hides_no_tumble(washed: float) -> None:
+def test_a_barometer_that_leaves_the_wash_of_its_propellers_hides_no_tumble(washed):
     """Given a barometer that tells so much more, m, within 0.2 s of the failure of a motor."""
     teller, height, speed, begun = up("multirotor"), HIGH, 0.0, 0
     while not deployed(teller) and height > HIGH - 40.0:
@@ -62,9 +58,7 @@ def test_a_barometer_that_leaves_the_wash_of_its_propellers_hides_no_tumble(wash
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 @pytest.mark.parametrize("fastest", [10.0, 12.0, 14.0])
-def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(
-    profile: str, fastest: float
-) -> None:
+def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(profile, fastest):
     """Given a quadplane whose lift stops; nobody tells what was commanded."""
     took = fall(up(profile), fastest, tilt=10.0)
     assert falling_flat(took, fastest)[0] < 2.2 * fastest
@@ -72,9 +66,7 @@ def test_what_hovers_and_falls_flat_is_deployed_whichever_profile_it_flies_with(
 
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("fastest", [12.0, 18.0, 25.0])
-def test_what_lies_on_its_side_with_the_thrust_of_a_hover_is_deployed(
-    error: float, fastest: float
-) -> None:
+def test_what_lies_on_its_side_with_the_thrust_of_a_hover_is_deployed(error, fastest):
     """Given motors that push on with its weight, and an airspeed to the side as downwards."""
     teller, height, tilt = up("multirotor"), HIGH, 4.0
     aside = down = 0.0

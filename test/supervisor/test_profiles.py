@@ -1,8 +1,6 @@
 """Each rule of each shipped profile: just over its limit for just long enough it acts, just under
 it, or for just too short, it does not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from random import Random
@@ -221,7 +219,7 @@ def alarms(story: Story, rule: str) -> int:
 
 
 @pytest.mark.parametrize("case", DEPLOYS, ids=str)
-def test_over_its_limit_for_long_enough_it_kills_and_then_deploys(case: Case) -> None:
+def test_over_its_limit_for_long_enough_it_kills_and_then_deploys(case):
     story = case.flying()
     case.over_for(story, case.enough() - 1)
     assert story.fired() == []
@@ -237,7 +235,7 @@ def test_over_its_limit_for_long_enough_it_kills_and_then_deploys(case: Case) ->
 
 
 @pytest.mark.parametrize("case", DEPLOYS, ids=str)
-def test_with_a_confirmed_kill_it_deploys_at_once(case: Case) -> None:
+def test_with_a_confirmed_kill_it_deploys_at_once(case):
     story = case.over_for(case.flying(), case.enough())
     story.at(story.t + 0.02, story.report(K, Outcome.CONFIRMED))
     assert story.fired() == ["KILL", "DEPLOY"]
@@ -245,8 +243,8 @@ def test_with_a_confirmed_kill_it_deploys_at_once(case: Case) -> None:
 
 @pytest.mark.parametrize("case", DEPLOYS, ids=str)
 def test_over_its_limit_for_just_too_short_or_just_under_it_for_long_it_does_nothing(
-    case: Case,
-) -> None:
+    case,
+):
     story = case.flying()
     case.over_for(story, case.enough() - 2)
     story.fly(story.t + 3.0, 0.1, **case.before)
@@ -258,7 +256,7 @@ def test_over_its_limit_for_just_too_short_or_just_under_it_for_long_it_does_not
 
 
 @pytest.mark.parametrize("case", ALARMS, ids=str)
-def test_over_its_limit_for_long_enough_it_warns_once_and_fires_nothing(case: Case) -> None:
+def test_over_its_limit_for_long_enough_it_warns_once_and_fires_nothing(case):
     story = case.flying()
     case.over_for(story, case.enough() - 1)
     assert alarms(story, case.rule) == 0
@@ -270,10 +268,10 @@ def test_over_its_limit_for_long_enough_it_warns_once_and_fires_nothing(case: Ca
 
 
 @pytest.mark.parametrize("case", ALARMS, ids=str)
-def test_just_under_its_limit_or_for_too_short_it_does_not_warn(case: Case) -> None:
+def test_just_under_its_limit_or_for_too_short_it_does_not_warn(case):
     story = case.flying()
     case.over_for(story, case.enough() - 2)
-    story.fly(story.t + 3 * case.hold + 2.0, EVERY, **{**case.before, **case.under})
+    story.fly(story.t + 3 * case.hold + 2.0, max(EVERY, case.hold / 50), **{**case.before, **case.under})
     assert alarms(story, case.rule) == 0
     assert story.fired() == []
 
@@ -282,7 +280,7 @@ EACH = pytest.mark.parametrize("name", ["multirotor", "fixed_wing", "rocket"])
 
 
 @EACH
-def test_every_rule_has_its_story(name: str) -> None:
+def test_every_rule_has_its_story(name):
     told = {case.rule for case in (*DEPLOYS, *ALARMS) if case.profile == name}
     told |= {"device asks for a kill", "parachute open", "link lost"}
     told |= {"flight computer in fault", "flight computer in fault, on its way"}
@@ -298,7 +296,7 @@ def test_every_rule_has_its_story(name: str) -> None:
 
 
 @EACH
-def test_a_flight_that_goes_well_fires_and_warns_nothing(name: str) -> None:
+def test_a_flight_that_goes_well_fires_and_warns_nothing(name):
     story = Story(shipped(name)).ready()
     story.fly(2.0, height=5.0, vertical_speed=3.0)
     story.fly(20.0, height=50.0, tilt=20.0)
@@ -311,9 +309,7 @@ def test_a_flight_that_goes_well_fires_and_warns_nothing(name: str) -> None:
     ("height", "tilt", "fired"),
     [(2.9, 60.1, ["KILL"]), (-2.9, 60.1, ["KILL"]), (3.1, 60.1, []), (2.9, 59.9, [])],
 )
-def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(
-    height: float, tilt: float, fired: list[str]
-) -> None:
+def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(height, tilt, fired):
     story = Story(shipped("multirotor")).ready().fly(1.0, height=height)
     story.fly(1.2, height=height, tilt=tilt)
     assert story.fired() == [], "not by four samples"
@@ -323,9 +319,7 @@ def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(
 
 
 @pytest.mark.parametrize(("force", "fired"), [(21.6, []), (9.8, ["KILL"])])
-def test_a_level_pass_at_the_height_of_the_take_off_has_not_tipped_over(
-    force: float, fired: list[str]
-) -> None:
+def test_a_level_pass_at_the_height_of_the_take_off_has_not_tipped_over(force, fired):
     """At 63 degrees of bank, where no target is told: PX4 in acro, or another source."""
     story = Story(shipped("multirotor")).ready().fly(1.0, height=30.0).fly(9.0, height=2.0)
     story.fly(12.0, height=2.0, tilt=63.0, acceleration=force)
@@ -333,7 +327,7 @@ def test_a_level_pass_at_the_height_of_the_take_off_has_not_tipped_over(
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_an_attitude_sensor_that_sends_noise_ends_no_flight(name: str) -> None:
+def test_an_attitude_sensor_that_sends_noise_ends_no_flight(name):
     noise = Random(1)
     story = Story(shipped(name)).ready().fly(1.0)
     for step in range(1, 1200):
@@ -342,7 +336,7 @@ def test_an_attitude_sensor_that_sends_noise_ends_no_flight(name: str) -> None:
 
 
 @EACH
-def test_a_device_that_asks_for_a_kill_gets_it_in_any_state(name: str) -> None:
+def test_a_device_that_asks_for_a_kill_gets_it_in_any_state(name):
     for story in (
         Story(shipped(name)),
         Story(shipped(name)).ready(),
@@ -357,8 +351,8 @@ def test_a_device_that_asks_for_a_kill_gets_it_in_any_state(name: str) -> None:
 
 @EACH
 def test_an_open_parachute_stops_the_motors_in_flight_and_fires_nothing_on_the_ground(
-    name: str,
-) -> None:
+    name,
+):
     story = Story(shipped(name)).ready()
     story.at(0.1, story.heartbeat(), parachute(deployed=True))
     assert story.fired() == []
@@ -376,7 +370,7 @@ def abnormal(story: Story, device: str = "1/161") -> None:
 
 
 @EACH
-def test_a_flight_computer_in_fault_is_an_alarm(name: str) -> None:
+def test_a_flight_computer_in_fault_is_an_alarm(name):
     story = Story(shipped(name)).ready().fly(1.0)
     abnormal(story)
     assert sum("flight computer in fault" in one for one in story.alarms()) == 1
@@ -385,7 +379,7 @@ def test_a_flight_computer_in_fault_is_an_alarm(name: str) -> None:
 
 
 @pytest.mark.parametrize(("climbs", "fires"), [(60.0, False), (12.0, False), (8.0, True)])
-def test_a_rocket_that_climbs_is_not_ended_by_its_speed_alone(climbs: float, fires: bool) -> None:
+def test_a_rocket_that_climbs_is_not_ended_by_its_speed_alone(climbs, fires):
     """Given a speed that is suddenly 33 m/s down, which at ten samples a second is no jump."""
     story = Story(shipped("rocket")).ready()
     for step in range(80):
@@ -396,16 +390,14 @@ def test_a_rocket_that_climbs_is_not_ended_by_its_speed_alone(climbs: float, fir
 
 
 @pytest.mark.parametrize("height", [3000.0, math.nan])
-def test_a_rocket_that_falls_is_deployed_beside_heights_that_tell_nothing(height: float) -> None:
+def test_a_rocket_that_falls_is_deployed_beside_heights_that_tell_nothing(height):
     story = Story(shipped("rocket")).ready().fly(1.0, height=3000.0, vertical_speed=1.0)
     story.sink(story.t + 8.0, 60.0, height=height, acceleration=3.0)
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
 @pytest.mark.parametrize(("sinks", "fires"), [(38.0, False), (59.0, False), (70.0, True)])
-def test_a_rocket_that_falls_as_fast_as_it_can_is_told_from_one_under_its_drogue(
-    sinks: float, fires: bool
-) -> None:
+def test_a_rocket_that_falls_as_fast_as_it_can_is_told_from_one_under_its_drogue(sinks, fires):
     """Given a sink that does not grow, as of recorded rockets under a drogue at 8 km and near the
     ground, and of one that came down without any: it was known before only as it sped up."""
     story = Story(shipped("rocket")).ready().fly(1.0, height=3000.0, vertical_speed=1.0)
@@ -421,9 +413,7 @@ def test_a_rocket_that_falls_as_fast_as_it_can_is_told_from_one_under_its_drogue
 @pytest.mark.parametrize("fix", [True, False])
 @pytest.mark.parametrize("swing", [0.0, 3.0, 4.0])
 @pytest.mark.parametrize("sinks", [31.0, 36.0, 40.0])
-def test_under_a_drogue_that_swings_nothing_else_is_ordered(
-    sinks: float, swing: float, fix: bool
-) -> None:
+def test_under_a_drogue_that_swings_nothing_else_is_ordered(sinks, swing, fix):
     """Given speeds under working drogues, with a receiver and by the heights of a barometer alone;
     a swing of 3 m/s takes 4 s, one of 4 m/s 10 s."""
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=3700.0), 3700.0
@@ -445,9 +435,7 @@ def under_drogue() -> i.ParachuteReport:
 
 
 @pytest.mark.parametrize(("fastest", "fires"), [(58.0, False), (75.0, True)])
-def test_a_drogue_that_is_known_to_be_out_may_be_as_fast_as_one_is(
-    fastest: float, fires: bool
-) -> None:
+def test_a_drogue_that_is_known_to_be_out_may_be_as_fast_as_one_is(fastest, fires):
     """Given the main as the parachute, and a drogue high up, under which it speeds up as in a fall
     for as long."""
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=8000.0), 8000.0
@@ -461,7 +449,7 @@ def test_a_drogue_that_is_known_to_be_out_may_be_as_fast_as_one_is(
         assert story.newest(D).rule == "ballistic"
 
 
-def test_a_rocket_that_falls_on_under_a_canopy_is_an_alarm_that_does_not_stop() -> None:
+def test_a_rocket_that_falls_on_under_a_canopy_is_an_alarm_that_does_not_stop():
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=3700.0), 3700.0
     story.at(story.t + 0.01, parachute(deployed=True))
     for step in range(200):
@@ -482,7 +470,7 @@ def falls_on(story: Story, height: float, until: float, fastest: float) -> float
 
 
 @pytest.mark.parametrize("flagged", [True, False])
-def test_a_drogue_of_ours_that_does_not_carry_is_followed_by_the_main(flagged: bool) -> None:
+def test_a_drogue_of_ours_that_does_not_carry_is_followed_by_the_main(flagged):
     """Given `deploy_stage` next, and a charge that is a dud; not every firmware sets a flag."""
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=3700.0), 3700.0
     height = falls_on(story, height, 3.0, 73.0)
@@ -500,9 +488,7 @@ def test_a_drogue_of_ours_that_does_not_carry_is_followed_by_the_main(flagged: b
 
 @pytest.mark.parametrize("anew", [{}, {**REBOOTED, "height_holds": True}])
 @pytest.mark.parametrize(("sinks", "fires"), [(22.0, True), (12.5, True), (8.0, False)])
-def test_a_main_that_is_overdue_is_ordered(
-    sinks: float, fires: bool, anew: dict[str, Any]
-) -> None:
+def test_a_main_that_is_overdue_is_ordered(sinks, fires, anew):
     """Given a drogue that is out, and a main that is the parachute and never comes: a flight
     computer that started anew knows nothing of it."""
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=600.0), 600.0
@@ -519,7 +505,7 @@ def test_a_main_that_is_overdue_is_ordered(
         assert 90.0 < height < 150.0 - sinks
 
 
-def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told() -> None:
+def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told():
     story, height = Story(shipped("rocket")).ready().fly(1.0, height=300.0), 300.0
     story.at(story.t + 0.01, parachute(deployed=True))
     while height > 50.0:
@@ -529,7 +515,7 @@ def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told() -> N
     assert "DEPLOY" not in story.fired()
 
 
-def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
+def test_a_rocket_in_fault_that_comes_down_is_deployed():
     story = Story(shipped("rocket")).ready().fly(1.0)
     abnormal(story)
     story.fly(4.0, vertical_speed=-19.9)
@@ -541,7 +527,7 @@ def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
     assert story.newest(D).rule == "flight computer in fault"
 
 
-def test_under_a_drogue_a_fault_orders_no_main() -> None:
+def test_under_a_drogue_a_fault_orders_no_main():
     """Real drogues came down with 30 to 38 m/s."""
     story = Story(shipped("rocket")).ready().fly(1.0)
     story.at(story.t + 0.01, under_drogue())
@@ -552,9 +538,7 @@ def test_under_a_drogue_a_fault_orders_no_main() -> None:
 
 @pytest.mark.parametrize("drogue", [False, True])
 @pytest.mark.parametrize("ground", [0.0, -280.0])
-def test_a_rocket_whose_computer_started_anew_without_a_fix_is_seen_to_fall(
-    ground: float, drogue: bool
-) -> None:
+def test_a_rocket_whose_computer_started_anew_without_a_fix_is_seen_to_fall(ground, drogue):
     """By its heights alone, whatever they are above since then. One that sinks as fast all the
     time is under a drogue."""
     story = Story(shipped("rocket")).ready().fly(1.0, height=900.0, vertical_speed=1.0)
@@ -575,7 +559,7 @@ def test_a_rocket_whose_computer_started_anew_without_a_fix_is_seen_to_fall(
     assert story.t == pytest.approx(1.05 + 30.0 / 9.81 + 0.5 + 2.0, abs=0.3)
 
 
-def test_a_rocket_whose_computer_starts_anew_with_another_height_does_not_fall() -> None:
+def test_a_rocket_whose_computer_starts_anew_with_another_height_does_not_fall():
     story = Story(shipped("rocket")).ready().fly(1.0, height=300.0, vertical_speed=1.0)
     unfixed = {**REBOOTED, "vertical_speed": math.nan}
     for height in (300.0, 250.0, 0.0):
@@ -583,7 +567,7 @@ def test_a_rocket_whose_computer_starts_anew_with_another_height_does_not_fall()
     assert story.fired() == []
 
 
-def test_a_rocket_coasts_in_free_fall_and_turns_over_without_a_deploy() -> None:
+def test_a_rocket_coasts_in_free_fall_and_turns_over_without_a_deploy():
     story = Story(shipped("rocket")).ready().fly(1.0, acceleration=90.0, vertical_speed=80.0)
     story.fly(9.0, acceleration=0.3, vertical_speed=10.0, tilt=175.0)
     story.fly(15.0, acceleration=9.0, vertical_speed=-15.0, tilt=175.0)
@@ -591,7 +575,7 @@ def test_a_rocket_coasts_in_free_fall_and_turns_over_without_a_deploy() -> None:
 
 
 @EACH
-def test_a_lost_link_in_flight_is_an_alarm_and_no_more(name: str) -> None:
+def test_a_lost_link_in_flight_is_an_alarm_and_no_more(name):
     story = Story(shipped(name)).ready().fly(1.0)
     for n in range(1, 200):
         story.at(1.0 + n * 0.05, story.told())
@@ -601,8 +585,8 @@ def test_a_lost_link_in_flight_is_an_alarm_and_no_more(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
 def test_an_autopilot_that_falls_silent_with_everything_else_is_an_alarm_in_its_time(
-    name: str,
-) -> None:
+    name,
+):
     story = Story(shipped(name)).ready().fly(1.0)
     story.at(3.9)
     assert alarms(story, "autopilot lost") == 0
@@ -618,8 +602,8 @@ DIVE = {"vertical_speed": -11.0, "tilt": 25.0, "attitude_error": 4.0, "accelerat
 
 @pytest.mark.parametrize("before", [{"battery_remaining": 0.0}, REBOOTED])
 def test_a_dive_that_is_commanded_is_no_fall_beside_an_empty_battery_or_a_restart(
-    before: dict[str, Any],
-) -> None:
+    before,
+):
     story = Story(shipped("fixed_wing")).ready().fly(2.0, height=120.0)
     story.fly(3.0, height=120.0, **before)
     height = 120.0
@@ -637,9 +621,7 @@ def test_a_dive_that_is_commanded_is_no_fall_beside_an_empty_battery_or_a_restar
         ("fixed_wing", {"tilt": 74.0, "acceleration": 35.0}),
     ],
 )
-def test_a_restart_after_which_it_flew_on_ends_no_manoeuvre_of_later(
-    profile: str, does: dict[str, Any], steady: float, fires: bool
-) -> None:
+def test_a_restart_after_which_it_flew_on_ends_no_manoeuvre_of_later(profile, does, steady, fires):
     """ArduPlane arms itself again after its watchdog, and flies on."""
     story = Story(shipped(profile)).ready().fly(2.0, height=120.0)
     story.fly(2.0 + steady, height=120.0, **REBOOTED)
@@ -653,9 +635,7 @@ def test_a_restart_after_which_it_flew_on_ends_no_manoeuvre_of_later(
 
 
 @pytest.mark.parametrize(("slows", "fires"), [(1.5, False), (0.0, True)])
-def test_a_descent_that_is_caught_with_full_thrust_is_no_sink_that_goes_on(
-    slows: float, fires: bool
-) -> None:
+def test_a_descent_that_is_caught_with_full_thrust_is_no_sink_that_goes_on(slows, fires):
     """Full thrust upright counts as a command not to sink."""
     story = Story(shipped("multirotor")).ready().fly(2.0, height=150.0)
     speed, height = 0.0, 150.0
