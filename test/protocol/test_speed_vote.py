@@ -1,7 +1,5 @@
 """Two origins stand against one: a barometer and another source outvote an estimate."""
 
-from __future__ import annotations
-
 import math
 import random
 

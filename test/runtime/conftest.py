@@ -1,7 +1,5 @@
 """What tests of the runtime share."""
 
-from __future__ import annotations
-
 import pytest
 from runtime_shell import Shell
 

@@ -1,7 +1,5 @@
 """The shell of a runtime in tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

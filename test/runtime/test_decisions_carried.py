@@ -1,7 +1,5 @@
 """Decisions through the gate of a node, and what is reported of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -42,20 +40,20 @@ def decision(number: int, action: Action, epoch: int = 8) -> Decision:
     return Decision(epoch, number, action, "a rule", ("it fell",), ("upf_can",), False)
 
 
-def test_what_waited_is_done_in_the_order_in_which_it_was_decided(shell: Shell) -> None:
+def test_what_waited_is_done_in_the_order_in_which_it_was_decided(shell):
     node = Carried(shell)
     node.hear((8, Action.DEPLOY), (7, Action.KILL), (8, Action.DEPLOY))
     assert node.done == [7, 8]
 
 
-def test_one_that_fails_keeps_no_other_back(shell: Shell) -> None:
+def test_one_that_fails_keeps_no_other_back(shell):
     node = Carried(shell)
     with pytest.raises(ZeroDivisionError):
         node.hear((1, Action.NONE), (2, Action.KILL), (3, Action.DEPLOY))
     assert node.done == [2, 3]
 
 
-def test_one_that_is_said_again_gets_its_newest_report_again(shell: Shell) -> None:
+def test_one_that_is_said_again_gets_its_newest_report_again(shell):
     node = Carried(shell)
     node.hear((7, Action.DEPLOY))
     node.hear((7, Action.DEPLOY))
@@ -69,7 +67,7 @@ def test_one_that_is_said_again_gets_its_newest_report_again(shell: Shell) -> No
     assert node.done == [7], "and is done once"
 
 
-def test_one_of_before_is_answered_with_the_newest_that_was_seen(shell: Shell) -> None:
+def test_one_of_before_is_answered_with_the_newest_that_was_seen(shell):
     node = Carried(shell)
     node.hear((7, Action.FLIGHT_BLOCK), epoch=16)
     node.hear((9, Action.DEPLOY), epoch=8)
@@ -81,7 +79,7 @@ def test_one_of_before_is_answered_with_the_newest_that_was_seen(shell: Shell) -
     )
 
 
-def test_a_late_one_is_complained_of_once_a_second_and_counted_each_time(shell: Shell) -> None:
+def test_a_late_one_is_complained_of_once_a_second_and_counted_each_time(shell):
     node = Carried(shell)
     for _ in range(25):
         node.hear((7, Action.DEPLOY), age=0.6)
@@ -91,7 +89,7 @@ def test_a_late_one_is_complained_of_once_a_second_and_counted_each_time(shell: 
     assert [one.severity for one in shell.logged] == [Severity.ERROR] * 3
 
 
-def test_reports_of_long_ago_are_forgotten(shell: Shell) -> None:
+def test_reports_of_long_ago_are_forgotten(shell):
     node = Carried(shell)
     numbers = range(1, MOST_REPORTS + 2)
     for number in numbers:
@@ -100,7 +98,7 @@ def test_reports_of_long_ago_are_forgotten(shell: Shell) -> None:
     assert set(node.carrier._reports) == {(8, number) for number in numbers[1:]}
 
 
-def test_what_others_carry_out_is_told_if_it_is_young_meant_and_of_who_leads(shell: Shell) -> None:
+def test_what_others_carry_out_is_told_if_it_is_young_meant_and_of_who_leads(shell):
     node = Carried(shell)
 
     def told(number: int, epoch: int = 8, age: float = 0.01, shadow: bool = False) -> list[int]:
@@ -137,7 +135,7 @@ def autopilots_node(shell: Shell) -> MavlinkRuntime:
     return MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=False), shell)
 
 
-def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell: Shell) -> None:
+def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell):
     """PX4 refuses to disarm in flight; it may be terminated once a deploy is decided. The pilot
     reads of it, whose only way is this node's."""
     node = autopilots_node(shell)
@@ -152,7 +150,7 @@ def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell: Shell) -
     assert shell.link.texts[1:] == ["DEPLOY by upf_can confirmed"]
 
 
-def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell: Shell) -> None:
+def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell):
     node = autopilots_node(shell)
     picture = SafetyPicture(False, (), "safety_supervisor", {})
     told = [("a 1.5 s",), ("a 1.6 s",), ("a 1.7 s", "b"), (), ("b",)]
@@ -161,7 +159,7 @@ def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell: Shell) -> None
     assert shell.link.texts == ["a 1.5 s", "b", "b"], "after a reset it is a new one"
 
 
-def test_the_pilot_reads_why_flight_is_blocked_now(shell: Shell) -> None:
+def test_the_pilot_reads_why_flight_is_blocked_now(shell):
     """Given a block of the first second, when nothing was heard yet, and what is wrong later."""
     node = autopilots_node(shell)
     block = replace(decision(1, Action.FLIGHT_BLOCK), targets=("mavlink_parachute",))

@@ -1,7 +1,5 @@
 """Kills and deploys of before, for whoever comes late: also of a supervisor that died."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from runtime_shell import Shell
@@ -49,7 +47,7 @@ def start(shell: SupervisorShell, now: float, before: Any = None) -> SupervisorR
     return SupervisorRuntime(SupervisorConfig(), lease, shell, Start(7, "a", before), now)
 
 
-def test_each_kill_and_deploy_is_told_again_and_no_flight_block_is() -> None:
+def test_each_kill_and_deploy_is_told_again_and_no_flight_block_is():
     shell = SupervisorShell()
     one = start(shell, 100.0)
     one.turn((), 100.0)
@@ -65,7 +63,7 @@ def test_each_kill_and_deploy_is_told_again_and_no_flight_block_is() -> None:
     assert shell.of(SafetyTold)[-1].fired == decided[-1].id
 
 
-def test_a_supervisor_that_goes_on_tells_what_the_last_one_decided() -> None:
+def test_a_supervisor_that_goes_on_tells_what_the_last_one_decided():
     shell = SupervisorShell()
     one = start(shell, 100.0)
     one.turn((), 100.0)

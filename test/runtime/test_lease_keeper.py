@@ -1,7 +1,5 @@
 """What a supervisor says of the others that it hears, and how long it says it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -44,7 +42,7 @@ def heard(keeper: LeaseKeeper, name: str, rank: int, now: float) -> None:
 
 
 @pytest.mark.parametrize(("name", "told"), [("b", "has rank 0"), ("a", "is called a")])
-def test_a_rank_that_another_has_as_well_is_told_while_that_is_heard(name: str, told: str) -> None:
+def test_a_rank_that_another_has_as_well_is_told_while_that_is_heard(name, told):
     """Given one of its rank, with its own name or another: gone, or given a rank of its own, it
     is a trouble no more. An operator who had mended it read it until the next start."""
     config, owner = LeaseConfig("a", 0, standby=True), Supervisor()

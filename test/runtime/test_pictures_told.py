@@ -1,11 +1,8 @@
 """Pictures of the vehicle wait for the owner's turn, and are as old as they are when told."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
-from runtime_shell import Shell
 
 from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.model import VehicleState
@@ -13,7 +10,7 @@ from chute_ros.protocol.events import VehicleChanged
 
 
 @pytest.mark.parametrize("waited", [0.0, 0.06, 3.0])
-def test_what_waited_is_older_by_that(shell: Shell, waited: float) -> None:
+def test_what_waited_is_older_by_that(shell, waited):
     """Given a height of 0.2 s before and a battery of 0.5 s before, at t+0 in the link's turn; the
     owner has its turn after waited seconds."""
     runtime = MavlinkRuntime("mavlink_parachute", MavlinkSettings(), shell)

@@ -1,7 +1,5 @@
 """What second sources say, and how it is merged with the autopilot's word."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -16,14 +14,14 @@ from chute_ros.runtime.vehicle_hearing import VehicleHearing
 
 
 @given(st.floats(-50.0, 500.0), st.floats(-60.0, 60.0), st.floats(-math.pi, math.pi))
-def test_odometry_reads_as_what_is_so(height: float, speed: float, roll: float) -> None:
+def test_odometry_reads_as_what_is_so(height, speed, roll):
     told = readings.odometry(odometry(height, speed, roll))
     assert told["height"] == (height,)
     assert told["vertical_speed"] == pytest.approx((speed,), abs=1e-9)
     assert told["attitude"][3] == pytest.approx(abs(roll), abs=1e-6)
 
 
-def test_an_imu_reads_as_what_is_so() -> None:
+def test_an_imu_reads_as_what_is_so():
     told = readings.imu(Imu(rolled(1.0), Vector(z=9.8)))
     assert told["attitude"][0] == pytest.approx(1.0)
     assert told["acceleration"] == (9.8,)
@@ -31,7 +29,7 @@ def test_an_imu_reads_as_what_is_so() -> None:
     assert gone == {"attitude": None, "acceleration": (9.8,)}
 
 
-def test_the_picture_is_told_at_once_and_then_as_often_as_by_the_node() -> None:
+def test_the_picture_is_told_at_once_and_then_as_often_as_by_the_node():
     """Given messages each 4 ms: the first is told at once, the others together."""
     told: list[tuple[float, VehicleState]] = []
     hearing = VehicleHearing(

@@ -1,7 +1,5 @@
 """How a device node watches over its supervisors."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -14,13 +12,13 @@ def heard(watch: SupervisorWatch, name: str, now: float, leading: bool = False) 
     watch.heartbeat(SupervisorBeat(name, leading), 0.001, now)
 
 
-def test_one_that_was_never_heard_is_not_lost() -> None:
+def test_one_that_was_never_heard_is_not_lost():
     watch = SupervisorWatch(0.5, 1.0)
     assert watch.look(1000.0) is None
     assert math.isnan(watch.tell(1000.0).silence)
 
 
-def test_one_that_falls_silent_is_lost_once_and_comes_back_once() -> None:
+def test_one_that_falls_silent_is_lost_once_and_comes_back_once():
     watch = SupervisorWatch(0.5, 1.0)
     heard(watch, "a", 10.0, leading=True)
     assert watch.look(11.0) is None, "silent for as long as it may be"
@@ -30,14 +28,14 @@ def test_one_that_falls_silent_is_lost_once_and_comes_back_once() -> None:
     assert watch.tell(13.1).times_lost == 1
 
 
-def test_one_that_only_looks_on_keeps_nobody_from_missing_the_leader() -> None:
+def test_one_that_only_looks_on_keeps_nobody_from_missing_the_leader():
     watch = SupervisorWatch(0.5, 1.0)
     heard(watch, "a", 10.0, leading=True)
     heard(watch, "b", 11.5)
     assert watch.look(11.5) is True
 
 
-def test_a_supervisor_of_a_fifth_name_counts_once_another_is_gone() -> None:
+def test_a_supervisor_of_a_fifth_name_counts_once_another_is_gone():
     """Given four that were heard before: made-up names, or supervisors that were renamed."""
     watch = SupervisorWatch(0.5, 0.2)
     for name in "abcd":
@@ -52,7 +50,7 @@ def test_a_supervisor_of_a_fifth_name_counts_once_another_is_gone() -> None:
     assert watch.tell(10.3).silence == pytest.approx(0.05), "and finds none itself"
 
 
-def test_a_decision_of_a_clock_that_was_set_is_no_older() -> None:
+def test_a_decision_of_a_clock_that_was_set_is_no_older():
     """Given a supervisor whose wall clock is set back by an hour between two heartbeats."""
     watch = SupervisorWatch(0.5, 1.0)
     watch.heartbeat(SupervisorBeat("a", True), 0.001, 10.0)
@@ -61,7 +59,7 @@ def test_a_decision_of_a_clock_that_was_set_is_no_older() -> None:
     assert watch.tell(10.1).offset == pytest.approx(3600.0)
 
 
-def test_a_clock_that_is_behind_shows_in_the_answer_to_our_own_heartbeat() -> None:
+def test_a_clock_that_is_behind_shows_in_the_answer_to_our_own_heartbeat():
     """Given one that seems to be 2 s away, and a picture that answers what left 0.1 s ago."""
     watch = SupervisorWatch(0.5, 1.0)
     watch.heartbeat(SupervisorBeat("a", True), 2.0, 10.0)

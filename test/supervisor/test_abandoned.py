@@ -1,7 +1,5 @@
 """A deploy that was begun and came to nothing: while it falls, something must still be tried."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -44,12 +42,12 @@ def at_its_end(autopilot: bool = True) -> Story:
 
 
 @pytest.mark.parametrize("autopilot", [True, False])
-def test_it_is_tried_again_whoever_tells_the_fall(autopilot: bool) -> None:
+def test_it_is_tried_again_whoever_tells_the_fall(autopilot):
     story = falls_for(at_its_end(autopilot), 10.0, autopilot)
     assert len(story.decisions(D)) == 2
 
 
-def test_without_a_word_that_it_falls_it_is_not_tried_again() -> None:
+def test_without_a_word_that_it_falls_it_is_not_tried_again():
     story = at_its_end(autopilot=False)
     for _ in range(200):
         state = story.told(vertical_speed=0.0).state
@@ -63,7 +61,7 @@ def test_without_a_word_that_it_falls_it_is_not_tried_again() -> None:
     "kill",
     [i.KillRequest(9, "operator", "stop"), i.KillRequest(0, "upf_can 33", "about to launch")],
 )
-def test_a_kill_after_its_end_does_not_end_the_tries(kill: i.KillRequest) -> None:
+def test_a_kill_after_its_end_does_not_end_the_tries(kill):
     story = at_its_end()
     falls_for(story, 1.0).at(story.t, kill)
     falls_for(story, 0.2)
@@ -73,7 +71,7 @@ def test_a_kill_after_its_end_does_not_end_the_tries(kill: i.KillRequest) -> Non
     assert len(story.decisions(D)) == 2
 
 
-def test_a_person_who_kills_after_its_end_is_answered() -> None:
+def test_a_person_who_kills_after_its_end_is_answered():
     story = at_its_end()
     story.at(story.t + 0.1, i.KillRequest(9, "operator", "stop"))
     story.at(story.t + 0.1, story.report(K, Outcome.CONFIRMED))
@@ -81,7 +79,7 @@ def test_a_person_who_kills_after_its_end_is_answered() -> None:
 
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
-def test_a_wrong_word_of_an_open_parachute_leaves_no_rule_dead(profile: str) -> None:
+def test_a_wrong_word_of_an_open_parachute_leaves_no_rule_dead(profile):
     """Given a rule that has just killed, as a parachute says for a moment that it is out."""
     story = Story(shipped(profile)).ready().fly(1.0, height=2000.0)
     while story.state.stage is not Stage.KILLING:
@@ -96,7 +94,7 @@ def test_a_wrong_word_of_an_open_parachute_leaves_no_rule_dead(profile: str) -> 
     assert story.decisions(D) != []
 
 
-def test_an_alarm_that_was_said_is_not_said_again_for_it() -> None:
+def test_an_alarm_that_was_said_is_not_said_again_for_it():
     alarm = rule(SINKS, action=Action.NONE, clears=Clears.NEVER, name="alarm")
     story = Story(with_rules(alarm)).flying().fly(3.0, vertical_speed=-14.0)
     story.at(story.t, story.heartbeat(), parachute(deployed=True))
@@ -106,7 +104,7 @@ def test_an_alarm_that_was_said_is_not_said_again_for_it() -> None:
     assert len([one for one in story.alarms() if "'alarm'" in one]) == 1
 
 
-def test_inhibited_as_a_deploy_is_under_way_and_active_again_the_rules_live() -> None:
+def test_inhibited_as_a_deploy_is_under_way_and_active_again_the_rules_live():
     story = Story(shipped("multirotor")).ready().fly(1.0, height=100.0)
     story.at(1.02, story.heartbeat(), i.DeployRequest(5, False, "a test"))
     story.at(1.1, story.heartbeat(), story.report(K, Outcome.FAILED, detail="DENIED"))

@@ -1,7 +1,5 @@
 """Accidents that begin with something that was wrong before: a word, a restart, a gap."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import replace
@@ -32,7 +30,7 @@ def aloft(profile: str = "multirotor") -> Story:
     return Story(shipped(profile)).flying().fly(2.0)
 
 
-def test_one_that_steps_down_with_a_deploy_ordered_fires_it_when_it_leads_again() -> None:
+def test_one_that_steps_down_with_a_deploy_ordered_fires_it_when_it_leads_again():
     story = Story(with_rules(TILT, standby=True)).flying().fly(1.0).fly(1.5, tilt=90.0)
     assert story.fired() == ["KILL"]
     given(story, i.StepDown("overslept"))
@@ -48,8 +46,8 @@ OFF: dict[str, Any] = {"landed_state": GROUND, "armed": Armed.DISARMED}
 
 @pytest.mark.parametrize("off", [{"landed_state": GROUND, "tilt": 90.0}, OFF])
 def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_it(
-    off: dict[str, Any],
-) -> None:
+    off,
+):
     """Nor one after which the autopilot disarmed by itself."""
     disarms = "armed" in off
     story = aloft().fly(8.0, landed_state=GROUND)
@@ -58,7 +56,7 @@ def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_i
     assert story.fall(10.5, **off).fired()[:2] == ["KILL", "DEPLOY"]
 
 
-def test_what_it_said_before_a_persons_kill_is_not_its_effect_but_one_that_falls_then_is() -> None:
+def test_what_it_said_before_a_persons_kill_is_not_its_effect_but_one_that_falls_then_is():
     lies: dict[str, Any] = {"vertical_speed": 0.0, "acceleration": 9.8, "tilt": 70.0, **OFF}
     for before, falls in ((lies, False), ({"landed_state": GROUND}, True)):
         story = aloft().fly(2.4, **before)
@@ -73,17 +71,13 @@ def test_what_it_said_before_a_persons_kill_is_not_its_effect_but_one_that_falls
     [({}, {"acceleration": 0.0}), ({"vertical_speed": math.nan}, {"height": 36.0})],
     ids=["a force that reads nothing", "one step of a height"],
 )
-def test_one_sensor_that_is_wrong_in_a_hover_deploys_nothing(
-    before: dict[str, float], told: dict[str, float]
-) -> None:
+def test_one_sensor_that_is_wrong_in_a_hover_deploys_nothing(before, told):
     story = aloft().fly(3.0, height=50.0, **before).fly(6.0, **{"height": 50.0, **before, **told})
     assert story.fired() == []
 
 
 @pytest.mark.parametrize(("height", "believed_after"), [(50.0, 5.0), (9.0, 1.0)])
-def test_one_that_says_so_high_above_its_take_off_must_say_it_for_longer(
-    height: float, believed_after: float
-) -> None:
+def test_one_that_says_so_high_above_its_take_off_must_say_it_for_longer(height, believed_after):
     story = Story(shipped("multirotor")).flying().fly(2.0, height=height)
     story.fly(2.0 + believed_after - 0.1, height=height, landed_state=GROUND)
     assert story.state.stage is Stage.IN_FLIGHT
@@ -95,7 +89,7 @@ def test_one_that_says_so_high_above_its_take_off_must_say_it_for_longer(
     "said",
     [{"landed_state": GROUND}, {"landed_state": LandedState.IN_AIR, "armed": Armed.DISARMED}],
 )
-def test_a_supervisor_that_starts_in_the_middle_of_a_fall_sees_it(said: dict[str, Any]) -> None:
+def test_a_supervisor_that_starts_in_the_middle_of_a_fall_sees_it(said):
     story = Story(shipped("multirotor"))
     story.fall(3.0, tilt=90.0, **said)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
@@ -105,9 +99,7 @@ def test_a_supervisor_that_starts_in_the_middle_of_a_fall_sees_it(said: dict[str
     "wrong", [{"vertical_speed": -12.0}, {"height": 40.0}, {"acceleration": 0.0}]
 )
 @pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
-def test_one_wrong_sensor_on_the_ground_is_no_flight(
-    wrong: dict[str, float], armed: Armed
-) -> None:
+def test_one_wrong_sensor_on_the_ground_is_no_flight(wrong, armed):
     story = Story(shipped("multirotor")).ready()
     stands = {"height": 0.1, "vertical_speed": 0.0, "acceleration": 9.8, "tilt": 1.0}
     story.fly(5.0, **{**stands, **wrong}, landed_state=GROUND, armed=armed)
@@ -115,7 +107,7 @@ def test_one_wrong_sensor_on_the_ground_is_no_flight(
     assert story.fired() == []
 
 
-def test_after_a_kill_on_the_ground_flight_is_blocked_and_one_that_flies_is_watched() -> None:
+def test_after_a_kill_on_the_ground_flight_is_blocked_and_one_that_flies_is_watched():
     story = Story(shipped("multirotor")).ready()
     story.at(0.1, story.heartbeat(), i.KillRequest(0, "mavlink_parachute 1/161", "test"))
     story.at(0.15, story.report(K, Outcome.CONFIRMED))
@@ -128,7 +120,7 @@ def test_after_a_kill_on_the_ground_flight_is_blocked_and_one_that_flies_is_watc
     assert story.fired() == ["KILL", "KILL", "DEPLOY"]
 
 
-def test_a_person_who_insists_releases_another_parachute_than_the_one_that_is_out() -> None:
+def test_a_person_who_insists_releases_another_parachute_than_the_one_that_is_out():
     config = with_rules(TILT, deploy_links=(LINK, "upf_can"))
     story = Story(config).flying().fly(2.0)
     story.at(2.0, parachute(deployed=True))
@@ -144,7 +136,7 @@ def test_a_person_who_insists_releases_another_parachute_than_the_one_that_is_ou
     assert story.answer(9).success
 
 
-def test_a_deploy_after_the_motors_were_armed_again_is_preceded_by_another_kill() -> None:
+def test_a_deploy_after_the_motors_were_armed_again_is_preceded_by_another_kill():
     story = aloft()
     story.at(2.0, i.KillRequest(5, "operator", "x", kill_only=True))
     story.at(2.05, story.report(K, Outcome.CONFIRMED))
@@ -154,7 +146,7 @@ def test_a_deploy_after_the_motors_were_armed_again_is_preceded_by_another_kill(
     assert story.fired() == ["KILL", "KILL", "DEPLOY"]
 
 
-def test_as_long_as_it_falls_a_link_that_comes_back_is_told_again() -> None:
+def test_as_long_as_it_falls_a_link_that_comes_back_is_told_again():
     story = aloft()
     start = story.t
     for step in range(1, 400):
@@ -166,7 +158,7 @@ def test_as_long_as_it_falls_a_link_that_comes_back_is_told_again() -> None:
     assert any("still in the air" in why for d in story.decisions(D) for why in d.reasons)
 
 
-def test_one_wrong_sample_that_other_messages_tell_again_stays_one() -> None:
+def test_one_wrong_sample_that_other_messages_tell_again_stays_one():
     chance = random.Random(1)
     story = aloft()
     bad = story.t + 0.05
@@ -179,7 +171,7 @@ def test_one_wrong_sample_that_other_messages_tell_again_stays_one() -> None:
     assert story.fired() == []
 
 
-def test_a_node_that_counts_restarts_from_0_again_hides_none() -> None:
+def test_a_node_that_counts_restarts_from_0_again_hides_none():
     story = Story(shipped("multirotor"))
     down = {"armed": Armed.DISARMED, "landed_state": GROUND}
     story.at(0.0, story.heartbeat(), story.told(reboot_count=2, **down))
@@ -192,7 +184,7 @@ def test_a_node_that_counts_restarts_from_0_again_hides_none() -> None:
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_every_second_message_without_a_value_hides_no_fall(name: str) -> None:
+def test_every_second_message_without_a_value_hides_no_fall(name):
     story = aloft(name)
     for step in range(1, 160):
         told = {**falling(step * 0.05, 400.0), "tilt": 90.0}
@@ -202,7 +194,7 @@ def test_every_second_message_without_a_value_hides_no_fall(name: str) -> None:
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
 
 
-def test_gaps_in_the_messages_do_not_undo_what_was_counted() -> None:
+def test_gaps_in_the_messages_do_not_undo_what_was_counted():
     story = Story(with_rules(TILT)).flying().fly(2.0)
     for burst in range(5):
         for part in (0.0, 0.1):
@@ -211,7 +203,7 @@ def test_gaps_in_the_messages_do_not_undo_what_was_counted() -> None:
     assert story.when(K) < 4.0
 
 
-def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over() -> None:
+def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over():
     story, t = Story(shipped("multirotor")), 0.0
     while t < 10.0:
         t += 0.1
@@ -228,9 +220,7 @@ def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over() -> No
 
 
 @pytest.mark.parametrize(("height", "last"), [(-5.0, "KILL"), (-60.0, "DEPLOY")])
-def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(
-    height: float, last: str
-) -> None:
+def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(height, last):
     story = Story(shipped("multirotor")).flying().fly(3.0, height=20.0)
     for step in range(20):
         story.fly(story.t + 0.1, height=20.0 + (height - 20.0) * (step + 1) / 20)
@@ -238,7 +228,7 @@ def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(
     assert story.fired()[-1] == last
 
 
-def test_without_a_vertical_speed_the_heights_tell_the_sink() -> None:
+def test_without_a_vertical_speed_the_heights_tell_the_sink():
     story = Story(shipped("rocket")).flying().fly(2.0, height=1000.0, vertical_speed=math.nan)
     for step in range(1, 100):
         told = {"height": 1000.0 - 80.0 * step * 0.05, "vertical_speed": math.nan}
@@ -247,7 +237,7 @@ def test_without_a_vertical_speed_the_heights_tell_the_sink() -> None:
     assert "vertical_speed -80.00 (below -60)" in story.newest(K).reasons
 
 
-def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:
+def test_what_goes_wrong_again_and_again_does_not_grow_it():
     story, t = Story(shipped("multirotor")).flying().fly(1.0), 1.0
     for _ in range(100):
         t += 0.25
@@ -256,7 +246,7 @@ def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:
     assert len(story.state.alarming.alarms) <= 16
 
 
-def test_what_was_said_in_one_flight_is_said_in_the_next_as_well() -> None:
+def test_what_was_said_in_one_flight_is_said_in_the_next_as_well():
     down = {"landed_state": GROUND, "height": 0.0}
     story = Story(shipped("multirotor")).flying().fly(13.0, battery_remaining=0.01)
     story.fly(15.0, **down).fly(16.0, armed=Armed.DISARMED, **down)
@@ -267,7 +257,7 @@ def test_what_was_said_in_one_flight_is_said_in_the_next_as_well() -> None:
 
 @pytest.mark.parametrize("turns", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turns: float) -> None:
+def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name, turns):
     story = aloft(name)
     for step in range(1, 60):
         angle = 360.0 * turns * step * 0.1 % 360.0
@@ -277,7 +267,7 @@ def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turn
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
 
 
-def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_no_deploy() -> None:
+def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_no_deploy():
     waits = {"kill_to_deploy_delay": 2.0, "low_kill_to_deploy_delay": 2.0}
     story = Story(shipped("multirotor", **waits)).flying().fly(2.0, height=30.0)
     story.fall(5.1, 30.0)
@@ -288,7 +278,7 @@ def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_n
     assert "DEPLOY" in story.fired(), "a person's is never held back by it"
 
 
-def test_after_a_rules_deploy_a_person_who_insists_is_answered_and_a_reset_is_taken() -> None:
+def test_after_a_rules_deploy_a_person_who_insists_is_answered_and_a_reset_is_taken():
     story = aloft().fall(4.0)
     story.at(4.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
@@ -298,7 +288,7 @@ def test_after_a_rules_deploy_a_person_who_insists_is_answered_and_a_reset_is_ta
     assert story.answer(6).success, "nothing is under way any more"
 
 
-def test_an_accelerometer_that_reads_nothing_in_a_descent_deploys_nothing() -> None:
+def test_an_accelerometer_that_reads_nothing_in_a_descent_deploys_nothing():
     story = Story(shipped("multirotor")).flying().fly(2.0, height=100.0)
     for step in range(60):
         told = {"height": 100.0 - 6.0 * step * 0.1, "vertical_speed": -6.0 - step * 1e-3}
@@ -307,13 +297,13 @@ def test_an_accelerometer_that_reads_nothing_in_a_descent_deploys_nothing() -> N
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_a_fall_without_a_restart_is_not_called_one(name: str) -> None:
+def test_a_fall_without_a_restart_is_not_called_one(name):
     story = aloft(name).fall(6.0, 200.0, tilt=90.0)
     assert not story.state.rule("autopilot rebooted in flight").latched
     assert not story.state.rule("autopilot terminates").latched
 
 
-def test_a_link_that_was_only_silent_for_a_while_is_not_told_to_shoot_again() -> None:
+def test_a_link_that_was_only_silent_for_a_while_is_not_told_to_shoot_again():
     story = aloft()
     story.at(2.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     story.at(2.1, story.report(K, Outcome.CONFIRMED))
@@ -325,7 +315,7 @@ def test_a_link_that_was_only_silent_for_a_while_is_not_told_to_shoot_again() ->
     assert len(story.decisions(D)) == 2, "one that has restarted knows of nothing"
 
 
-def test_flying_down_a_valley_after_the_take_off_is_high_enough() -> None:
+def test_flying_down_a_valley_after_the_take_off_is_high_enough():
     """It was seen off the ground first: one that was not may be an estimator that runs away."""
     story = Story(shipped("multirotor")).flying().fly(0.1, height=0.0)
     story.fly(2.0, height=3.0)

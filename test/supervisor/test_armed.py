@@ -1,7 +1,5 @@
 """ARMED is what the parachutes say, not what was commanded once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -37,7 +35,7 @@ def keeps_saying(story: Story, until: float, *told: i.ParachuteReport) -> None:
         story.at(story.t + 0.1, *beats, i.VehicleReport(STANDING), *told)
 
 
-def test_one_that_was_disarmed_past_the_supervisor_is_armed_no_more() -> None:
+def test_one_that_was_disarmed_past_the_supervisor_is_armed_no_more():
     story = armed()
     keeps_saying(story, 5.0, says(True))
     assert story.state.stage is Stage.ARMED
@@ -48,14 +46,14 @@ def test_one_that_was_disarmed_past_the_supervisor_is_armed_no_more() -> None:
 
 
 @pytest.mark.parametrize(("after", "stage"), [(1.9, Stage.ARMED), (2.05, Stage.READY)])
-def test_its_status_has_two_seconds_to_show_it(after: float, stage: Stage) -> None:
+def test_its_status_has_two_seconds_to_show_it(after, stage):
     story = armed()
     keeps_saying(story, 1.8, says(False))
     story.at(after, story.heartbeat())
     assert story.state.stage is stage
 
 
-def test_the_core_wakes_for_it_by_itself() -> None:
+def test_the_core_wakes_for_it_by_itself():
     story = armed()
     keeps_saying(story, 1.9, says(False))
     assert next_deadline(story.config, story.state, START + 1.95) == START + 2.0
@@ -73,8 +71,8 @@ def test_the_core_wakes_for_it_by_itself() -> None:
     ],
 )
 def test_it_stays_armed_while_one_says_so_or_nobody_knows(
-    told: tuple[i.ParachuteReport, ...],
-) -> None:
+    told,
+):
     story = armed(deploy_links=(LINK, UPF), required_links=(LINK,))
     keeps_saying(story, 5.0, *told)
     assert story.state.stage is Stage.ARMED
@@ -83,7 +81,7 @@ def test_it_stays_armed_while_one_says_so_or_nobody_knows(
 # -- armed past the supervisor, or before a link was silent --------------------------------------
 
 
-def test_one_that_is_armed_past_the_supervisor_is_armed() -> None:
+def test_one_that_is_armed_past_the_supervisor_is_armed():
     story = Story().ready()
     keeps_saying(story, 1.9, says(True))
     assert story.state.stage is Stage.READY
@@ -92,7 +90,7 @@ def test_one_that_is_armed_past_the_supervisor_is_armed() -> None:
     assert f"READY -> ARMED: the parachute was armed ({LINK} 1/161 says armed)" in story.said()
 
 
-def test_after_it_was_disarmed_its_status_has_two_seconds_to_show_it() -> None:
+def test_after_it_was_disarmed_its_status_has_two_seconds_to_show_it():
     story = armed()
     keeps_saying(story, 3.0, says(True))
     story.at(3.05, i.ArmDone(2, False, True, "disarmed"))
@@ -104,9 +102,7 @@ def test_after_it_was_disarmed_its_status_has_two_seconds_to_show_it() -> None:
 
 
 @pytest.mark.parametrize(("told", "stage"), [(True, Stage.ARMED), (False, Stage.READY)])
-def test_when_a_link_is_whole_again_it_is_armed_again_if_it_still_says_so(
-    told: bool, stage: Stage
-) -> None:
+def test_when_a_link_is_whole_again_it_is_armed_again_if_it_still_says_so(told, stage):
     story = armed()
     keeps_saying(story, 3.0, says(True))
     while story.t < 4.5:
@@ -118,7 +114,7 @@ def test_when_a_link_is_whole_again_it_is_armed_again_if_it_still_says_so(
     assert story.state.stage is stage
 
 
-def test_a_heartbeat_that_overtakes_its_status_hides_no_armed_parachute() -> None:
+def test_a_heartbeat_that_overtakes_its_status_hides_no_armed_parachute():
     """The two come on two topics, whose order nobody promises."""
     story = armed()
     keeps_saying(story, 3.0, says(True))
@@ -132,9 +128,7 @@ def test_a_heartbeat_that_overtakes_its_status_hides_no_armed_parachute() -> Non
 
 
 @pytest.mark.parametrize(("told", "stage"), [(False, Stage.READY), (None, Stage.ARMED)])
-def test_what_it_was_before_the_silence_holds_until_it_says_otherwise(
-    told: bool | None, stage: Stage
-) -> None:
+def test_what_it_was_before_the_silence_holds_until_it_says_otherwise(told, stage):
     story = armed()
     keeps_saying(story, 3.0, says(True))
     silent = story.heartbeat(healthy=False, state=LinkState.STALE)
@@ -144,7 +138,7 @@ def test_what_it_was_before_the_silence_holds_until_it_says_otherwise(
     assert story.state.stage is stage
 
 
-def test_while_its_status_is_old_it_says_nothing_of_it() -> None:
+def test_while_its_status_is_old_it_says_nothing_of_it():
     story = Story().ready()
     keeps_saying(story, 5.0, says(True, alive=False))
     assert story.state.stage is Stage.READY

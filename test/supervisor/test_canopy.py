@@ -1,7 +1,5 @@
 """A canopy that is out and does not carry: the next parachute, or an alarm that does not stop."""
 
-from __future__ import annotations
-
 import pytest
 from story import LINK, Story, falling, parachute, pressure_at, shipped
 
@@ -40,13 +38,13 @@ def under_canopy(
     return story
 
 
-def test_one_that_carries_is_left_alone() -> None:
+def test_one_that_carries_is_left_alone():
     story = under_canopy(6.0, 20.0, *TWO)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.alarms() == []
 
 
-def test_one_that_does_not_is_followed_by_the_next_parachute() -> None:
+def test_one_that_does_not_is_followed_by_the_next_parachute():
     story = under_canopy(22.0, 4.5, *TWO)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
     assert "canopy does not carry" in {one.rule for one in story.decisions(Action.KILL)}
@@ -55,7 +53,7 @@ def test_one_that_does_not_is_followed_by_the_next_parachute() -> None:
     assert story.newest(Action.DEPLOY).device == "1/162"
 
 
-def test_without_another_it_is_an_alarm_that_does_not_stop() -> None:
+def test_without_another_it_is_an_alarm_that_does_not_stop():
     story = under_canopy(22.0, 10.0)
     assert story.fired() == ["KILL", "DEPLOY"]
     said = [one for one in story.alarms() if "the canopy does not carry" in one]
@@ -70,7 +68,7 @@ def test_without_another_it_is_an_alarm_that_does_not_stop() -> None:
     assert len(story.alarms()) == before
 
 
-def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other() -> None:
+def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other():
     story = Story(shipped("multirotor", deploy_ladder=TWO)).ready()
     story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
     story.fly(2.0, height=300.0)
@@ -89,7 +87,7 @@ def test_one_that_came_out_by_itself_after_a_kill_alone_is_followed_by_no_other(
     assert story.fired()[-1] == "DEPLOY"
 
 
-def test_a_kill_alone_under_a_canopy_keeps_back_no_other() -> None:
+def test_a_kill_alone_under_a_canopy_keeps_back_no_other():
     """Given a person who stops the motors once a rule has deployed."""
     story = under_canopy(22.0, 2.5, *TWO)
     height = story.state.measured("height").value
@@ -102,7 +100,7 @@ def test_a_kill_alone_under_a_canopy_keeps_back_no_other() -> None:
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_one_that_was_ordered_after_a_kill_alone_is_followed_as_any_other(late: bool) -> None:
+def test_one_that_was_ordered_after_a_kill_alone_is_followed_as_any_other(late):
     """Given a person who wants the kill alone, and then the deploy, which may be given up."""
     story = Story(shipped("multirotor", deploy_ladder=TWO)).ready()
     story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
@@ -121,9 +119,7 @@ def test_one_that_was_ordered_after_a_kill_alone_is_followed_as_any_other(late: 
 
 
 @pytest.mark.parametrize(("speed", "alarmed"), [(16.0, True), (12.0, True), (6.0, False)])
-def test_one_whose_estimator_hovers_under_it_is_an_alarm_by_the_barometer(
-    speed: float, alarmed: bool
-) -> None:
+def test_one_whose_estimator_hovers_under_it_is_an_alarm_by_the_barometer(speed, alarmed):
     story = under_canopy(speed, 6.0, *TWO, estimator_hovers=True)
     said = [one for one in story.alarms() if "sinks fast under a canopy" in one]
     assert bool(said) is alarmed

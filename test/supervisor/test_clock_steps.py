@@ -1,7 +1,5 @@
 """A wall clock that is set makes no decision older; a decision that comes late stays late."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -24,7 +22,7 @@ def heard_so_far(difference: float = 0.002, beats: int = 5) -> tuple[ClockSteps,
 
 
 @pytest.mark.parametrize("step", [3600.0, -3600.0, 0.5, -0.5])
-def test_a_clock_that_is_set_shows_with_the_next_heartbeat(step: float) -> None:
+def test_a_clock_that_is_set_shows_with_the_next_heartbeat(step):
     clocks, now = heard_so_far()
     assert clocks.heard(0.002 + step, now + BEAT) == pytest.approx(step)
     assert clocks.offset == pytest.approx(step)
@@ -33,7 +31,7 @@ def test_a_clock_that_is_set_shows_with_the_next_heartbeat(step: float) -> None:
 
 
 @pytest.mark.parametrize("ahead", [0.3, 49.4, 1e6])
-def test_a_first_heartbeat_from_the_future_tells_of_a_clock_that_is_ahead(ahead: float) -> None:
+def test_a_first_heartbeat_from_the_future_tells_of_a_clock_that_is_ahead(ahead):
     """Of two hosts whose clocks differ one was started anew: nothing arrives before it is sent."""
     clocks = ClockSteps(MARGIN)
     assert clocks.heard(0.002 - ahead, 5.0) == pytest.approx(-ahead, abs=0.01)
@@ -41,7 +39,7 @@ def test_a_first_heartbeat_from_the_future_tells_of_a_clock_that_is_ahead(ahead:
     assert clocks.age(0.703 - ahead) == pytest.approx(0.7, abs=0.01), "one that comes late is late"
 
 
-def test_one_that_was_late_itself_is_put_right_by_the_next() -> None:
+def test_one_that_was_late_itself_is_put_right_by_the_next():
     clocks = ClockSteps(MARGIN)
     clocks.heard(-46.0, 5.0)
     assert clocks.heard(-49.0, 5.1) == pytest.approx(-3.0), "it had taken 3 s"
@@ -49,7 +47,7 @@ def test_one_that_was_late_itself_is_put_right_by_the_next() -> None:
 
 
 @pytest.mark.parametrize("step", [3.0, 5.999, -5.0, 3600.0])
-def test_of_what_waited_while_this_host_hung_the_first_was_not_sent_just_now(step: float) -> None:
+def test_of_what_waited_while_this_host_hung_the_first_was_not_sent_just_now(step):
     """The clock was set while we hung for 3 s; the last ten heartbeats come at once."""
     clocks, now = heard_so_far()
     now += 3.0
@@ -69,8 +67,8 @@ def test_of_what_waited_while_this_host_hung_the_first_was_not_sent_just_now(ste
     )
 )
 def test_nothing_seems_to_come_from_the_future(
-    hangs: list[tuple[float, float, int, float]],
-) -> None:
+    hangs,
+):
     """Hangs, steps of the clock meanwhile, and heartbeats that waited, on ways of any length."""
     clocks, now = heard_so_far()
     clock = 0.0
@@ -83,7 +81,7 @@ def test_nothing_seems_to_come_from_the_future(
 
 
 @pytest.mark.parametrize("first", [49.4, 3600.0, 7.0, -MARGIN])
-def test_clocks_that_differ_from_the_start_are_no_step(first: float) -> None:
+def test_clocks_that_differ_from_the_start_are_no_step(first):
     """Decisions are refused, and pre-flight says why: a way may take so long."""
     clocks = ClockSteps(MARGIN)
     assert clocks.age(0.4) == 0.4, "before the first heartbeat the wall clock counts"
@@ -92,7 +90,7 @@ def test_clocks_that_differ_from_the_start_are_no_step(first: float) -> None:
     assert clocks.age(first) == first
 
 
-def test_an_answer_within_the_margin_or_overtaken_by_heartbeats_shows_nothing() -> None:
+def test_an_answer_within_the_margin_or_overtaken_by_heartbeats_shows_nothing():
     fresh, (clocks, now) = ClockSteps(MARGIN), heard_so_far()
     assert fresh.answered(0.1 + MARGIN, 0.1, 5.0) == 0.0
     assert clocks.answered(1.5, 1.6, now + 0.01) == 0.0
@@ -113,7 +111,7 @@ def test_an_answer_within_the_margin_or_overtaken_by_heartbeats_shows_nothing() 
         ([(9.0 - n / 10, 9.0 + n * 1e-4, 0.0) for n in range(90)], 9.0),
     ],
 )
-def test_what_heartbeats_show(told: list[tuple[float, float, float]], age: float) -> None:
+def test_what_heartbeats_show(told, age):
     """Each: its difference, how long after the last of five good ones, the step that it shows."""
     clocks, now = heard_so_far()
     for difference, later, step in told:
@@ -122,7 +120,7 @@ def test_what_heartbeats_show(told: list[tuple[float, float, float]], age: float
 
 
 @pytest.mark.parametrize("behind", [0.6, 49.4, 18809.379])
-def test_an_answer_tells_of_a_clock_that_is_behind(behind: float) -> None:
+def test_an_answer_tells_of_a_clock_that_is_behind(behind):
     """Its way took 0.02 s; it answers what left 0.05 s ago."""
     clocks = ClockSteps(MARGIN)
     clocks.heard(behind + 0.002, 5.0)
@@ -132,7 +130,7 @@ def test_an_answer_tells_of_a_clock_that_is_behind(behind: float) -> None:
     assert clocks.heard(behind + 0.002, 5.1) == 0.0
 
 
-def test_an_answer_that_was_long_on_its_way_makes_nothing_younger() -> None:
+def test_an_answer_that_was_long_on_its_way_makes_nothing_younger():
     clocks = ClockSteps(MARGIN)
     clocks.heard(3.0, 5.0)
     assert clocks.answered(3.0, 3.01, 5.1) == 0.0, "a way that takes 3 s each time"
@@ -148,9 +146,7 @@ def test_an_answer_that_was_long_on_its_way_makes_nothing_younger() -> None:
     st.floats(-1e5, 1e5),
     st.lists(st.tuples(st.booleans(), st.floats(0.0, 2.0), st.floats(0.0, 1.0)), min_size=1),
 )
-def test_no_answer_makes_anything_younger_than_it_is(
-    behind: float, told: list[tuple[bool, float, float]]
-) -> None:
+def test_no_answer_makes_anything_younger_than_it_is(behind, told):
     """Heartbeats on a way that takes no time, answers on one that takes up to 2 s; the clock of
     who sends them is behind from the start, or ahead."""
     clocks, now = ClockSteps(MARGIN), 0.0
@@ -165,7 +161,7 @@ def test_no_answer_makes_anything_younger_than_it_is(
 
 @pytest.mark.parametrize("step", [26.4, -26.4])
 @pytest.mark.parametrize("answer_first", [False, True])
-def test_a_step_counts_once_whichever_message_shows_it(step: float, answer_first: bool) -> None:
+def test_a_step_counts_once_whichever_message_shows_it(step, answer_first):
     clocks, now = heard_so_far()
     shows = [
         lambda at: clocks.answered(0.002 + step, 0.01, at),
@@ -189,7 +185,7 @@ def test_a_step_counts_once_whichever_message_shows_it(step: float, answer_first
         (-0.38, 0.1, True),
     ],
 )
-def test_the_bounds_of_a_step(change: float, passed: float, seen: bool) -> None:
+def test_the_bounds_of_a_step(change, passed, seen):
     clocks = ClockSteps(MARGIN)
     clocks.heard(0.125, 16.0)
     assert bool(clocks.heard(0.125 + change, 16.0 + passed)) is seen
@@ -199,7 +195,7 @@ DELAYS = st.lists(st.floats(0.0, 20.0), min_size=2, max_size=40)
 
 
 @given(DELAYS, st.floats(-0.2, 0.2))
-def test_delays_alone_are_never_a_step(delays: list[float], difference: float) -> None:
+def test_delays_alone_are_never_a_step(delays, difference):
     """However slow or jerky the way is, as long as it keeps the order."""
     clocks, arrived = ClockSteps(MARGIN), 0.0
     for number, delay in enumerate(delays):
@@ -209,9 +205,7 @@ def test_delays_alone_are_never_a_step(delays: list[float], difference: float) -
 
 
 @given(DELAYS, st.floats(30.0, 1e6), st.booleans(), st.integers(1, 39))
-def test_after_a_step_no_age_is_off_by_more_than_the_way_takes(
-    delays: list[float], step: float, back: bool, at: int
-) -> None:
+def test_after_a_step_no_age_is_off_by_more_than_the_way_takes(delays, step, back, at):
     clocks, arrived, set_by = ClockSteps(MARGIN), 0.0, 0.0
     for number, delay in enumerate(delays):
         if number == min(at, len(delays) - 1):

@@ -41,7 +41,7 @@ def bits(value: float) -> bytes:
     return struct.pack("<d", value)
 
 
-def test_the_fields_of_a_group_stand_in_the_state_as_they_did_before_it_had_groups() -> None:
+def test_the_fields_of_a_group_stand_in_the_state_as_they_did_before_it_had_groups():
     text = '{"is":"State","epoch":7,"started_at":0.0,"mode":1,"airborne":true}'
     state = State(7, 0.0, mode=i.Mode.SHADOW, flight=ThisFlight(airborne=True))
     assert CODEC.from_json(text) == state
@@ -50,13 +50,13 @@ def test_the_fields_of_a_group_stand_in_the_state_as_they_did_before_it_had_grou
         CODEC.from_json('{"is":"State","epoch":7,"started_at":0.0,"flight":{}}')
 
 
-def test_a_line_for_the_log_is_read_under_its_former_name() -> None:
+def test_a_line_for_the_log_is_read_under_its_former_name():
     said = i.LogMessage("it falls", alarm=True)
     assert CODEC.from_json('{"is":"Say","text":"it falls","alarm":true}') == said
     assert CODEC.to_json(said) == '{"is":"LogMessage","text":"it falls","alarm":true}'
 
 
-def test_the_golden_lines() -> None:
+def test_the_golden_lines():
     beat = i.LinkHeartbeat(LINK, LinkState.OK, True, 12, clock_difference=0.015)
     assert CODEC.to_json(beat) == (
         '{"is":"LinkHeartbeat","link":"mavlink_parachute","link_state":1,"device_healthy":true,'
@@ -74,7 +74,7 @@ def test_the_golden_lines() -> None:
     )
 
 
-def test_the_golden_lines_are_read() -> None:
+def test_the_golden_lines_are_read():
     line = '{"is":"Finish","token":5,"success":true,"accepted":false,"message":"out"}'
     assert CODEC.from_json(line) == i.Finish(5, True, False, "out")
     assert CODEC.from_json('{"is":"Rung","link":"upf_can"}') == Rung("upf_can")
@@ -83,14 +83,14 @@ def test_the_golden_lines_are_read() -> None:
 @pytest.mark.parametrize(
     "value", [0.0, -0.0, math.inf, -math.inf, 5e-324, 0.1, 1e308, -2.5e-8, START + 0.1]
 )
-def test_a_number_keeps_every_bit(value: float) -> None:
+def test_a_number_keeps_every_bit(value):
     told = there_and_back(VehicleState(height=value, height_age=value))
     assert isinstance(told, VehicleState)
     assert bits(told.height) == bits(value)
     assert bits(told.height_age) == bits(value)
 
 
-def test_not_a_number_stays_so_where_it_is_not_the_default() -> None:
+def test_not_a_number_stays_so_where_it_is_not_the_default():
     told = there_and_back(i.Finish(1, True, True, "nan"))
     assert told == i.Finish(1, True, True, "nan")
     config = SupervisorConfig()
@@ -102,20 +102,20 @@ def test_not_a_number_stays_so_where_it_is_not_the_default() -> None:
 
 
 @given(st.floats())
-def test_any_number_comes_back_as_it_was(value: float) -> None:
+def test_any_number_comes_back_as_it_was(value):
     told = there_and_back(State(epoch=1, started_at=value, flight=ThisFlight(armed_height=value)))
     assert isinstance(told, State)
     for one in (told.started_at, told.flight.armed_height):
         assert bits(one) == bits(value) or (math.isnan(one) and math.isnan(value))
 
 
-def test_whole_numbers_and_truth_do_not_become_each_other() -> None:
+def test_whole_numbers_and_truth_do_not_become_each_other():
     told = there_and_back(i.ArmRequest(1, True, 0, 0))
     assert isinstance(told, i.ArmRequest)
     assert (type(told.arm), type(told.triggers), type(told.day)) == (bool, int, int)
 
 
-def test_enumerations_and_flags_come_back_as_they_were() -> None:
+def test_enumerations_and_flags_come_back_as_they_were():
     status = ParachuteStatus("1", LinkState.STALE, armed_triggers=TriggerFlags(1 << 40))
     told = there_and_back(i.ParachuteReport(LINK, status))
     assert told == i.ParachuteReport(LINK, status)
@@ -137,7 +137,7 @@ def told_story() -> Story:
 
 
 @pytest.mark.parametrize("whole", [False, True])
-def test_a_whole_state_and_its_settings_come_back(whole: bool) -> None:
+def test_a_whole_state_and_its_settings_come_back(whole):
     story = told_story()
     for value in (story.state, story.config):
         text = CODEC.to_json(value, whole)
@@ -145,13 +145,13 @@ def test_a_whole_state_and_its_settings_come_back(whole: bool) -> None:
     assert str(CODEC.from_json(CODEC.to_json(story.state, whole))) == str(story.state)
 
 
-def test_a_whole_record_does_not_rest_on_defaults() -> None:
+def test_a_whole_record_does_not_rest_on_defaults():
     short, whole = (CODEC.to_json(SupervisorConfig(), one) for one in (False, True))
     assert short == '{"is":"SupervisorConfig"}'
     assert '"kill_to_deploy_delay":0.5' in whole
 
 
-def test_every_output_comes_back() -> None:
+def test_every_output_comes_back():
     outputs = [output for _, output in told_story().outputs]
     assert {type(output).__name__ for output in outputs} >= {"Decide", "LogMessage"}
     for output in outputs:
@@ -188,26 +188,26 @@ def test_every_output_comes_back() -> None:
         ('{"is":"VehicleReport","state":{"is":"Rung","link":"a"}}', "is no VehicleState"),
     ],
 )
-def test_what_does_not_fit_is_said(text: str, words: str) -> None:
+def test_what_does_not_fit_is_said(text, words):
     with pytest.raises(RecordError) as caught:
         CODEC.from_json(text)
     assert words in str(caught.value)
 
 
 @given(st.text(max_size=60))
-def test_no_text_raises_anything_else(text: str) -> None:
+def test_no_text_raises_anything_else(text):
     with contextlib.suppress(RecordError):
         CODEC.from_json(text)
 
 
-def test_the_armed_state_of_the_vehicle_is_not_lost_on_the_way() -> None:
+def test_the_armed_state_of_the_vehicle_is_not_lost_on_the_way():
     for armed in Armed:
         told = there_and_back(VehicleState(armed=armed))
         assert isinstance(told, VehicleState)
         assert told.armed is armed
 
 
-def test_what_must_be_of_one_class_is_of_no_other() -> None:
+def test_what_must_be_of_one_class_is_of_no_other():
     told = CODEC.to_json(i.DeployRequest(1, False, "why"))
     assert CODEC.from_json(told, i.Input) == i.DeployRequest(1, False, "why")
     for kind in (State, i.Output):
@@ -264,13 +264,13 @@ def refusal(text: str) -> str:
 
 
 @pytest.mark.parametrize("whole", [False, True])
-def test_what_a_class_is_made_of_comes_back_wherever_it_stands(whole: bool) -> None:
+def test_what_a_class_is_made_of_comes_back_wherever_it_stands(whole):
     codec = Codec(Wood, Scale)
     for value in (tree(), Wood((tree(), tree())), Scale(1.5)):
         assert codec.from_json(codec.to_json(value, whole)) == value
 
 
-def test_a_whole_record_does_not_rest_on_defaults_however_deep() -> None:
+def test_a_whole_record_does_not_rest_on_defaults_however_deep():
     leaf = '{"is":"Leaf","number":3}'
     assert Codec(Tree).to_json(tree(), whole=True) == (
         f'{{"is":"Tree","leaf":{leaf},"leaves":[{leaf}],"named":[[{leaf},{leaf}]],'
@@ -279,7 +279,7 @@ def test_a_whole_record_does_not_rest_on_defaults_however_deep() -> None:
     assert Codec(Tree).to_json(Tree(Leaf())) == '{"is":"Tree","leaf":{"is":"Leaf"}}'
 
 
-def test_only_the_classes_of_its_own_are_read() -> None:
+def test_only_the_classes_of_its_own_are_read():
     for stranger in ("Scale", "int", "Colour"):
         assert refusal(f'{{"is":"{stranger}"}}') == (
             f"cannot be read: class {stranger} is not known: written by another version "
@@ -287,13 +287,13 @@ def test_only_the_classes_of_its_own_are_read() -> None:
         )
 
 
-def test_another_value_where_a_class_belongs_is_said_with_the_beginning_of_the_text() -> None:
+def test_another_value_where_a_class_belongs_is_said_with_the_beginning_of_the_text():
     text = '{"is":"Tree","leaf":7,"leaves":[' + '{"is":"Leaf"},' * 9 + '{"is":"Leaf"}]}'
     assert refusal(text) == f"cannot be read: 7 is no Leaf in {text[:80]!r}"
 
 
 @pytest.mark.parametrize("weight", [0, -0.0, False])
-def test_what_only_equals_the_default_is_written(weight: float) -> None:
+def test_what_only_equals_the_default_is_written(weight):
     codec = Codec(Kitchen)
     assert codec.to_json(Kitchen(Scale(0.0))) == '{"is":"Kitchen"}'
     scale = f'{{"is":"Scale","weight":{json.dumps(weight)}}}'
@@ -301,6 +301,6 @@ def test_what_only_equals_the_default_is_written(weight: float) -> None:
     assert codec.to_json(Kitchen(Scale(weight))) == f'{{"is":"Kitchen","scale":{scale}}}'
 
 
-def test_what_is_neither_a_class_nor_a_number_of_one_is_read_as_it_stands() -> None:
+def test_what_is_neither_a_class_nor_a_number_of_one_is_read_as_it_stands():
     assert Codec(Tree).from_json('["a",7]') == ["a", 7]
     assert Codec(Tree).from_json('{"is":"Leaf","number":true}').number is True

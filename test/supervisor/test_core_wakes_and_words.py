@@ -110,7 +110,7 @@ def heard(at: float, **parts: float) -> MappingProxyType[str, LinkEvidence]:
         ({"alarm_at": 101.25, "links": heard(NOW), "kill": sent(K, 99.0, 99.95)}, 100.05),
     ],
 )
-def test_it_wakes_when_the_first_time_is_over(known: dict[str, Any], wakes: float) -> None:
+def test_it_wakes_when_the_first_time_is_over(known, wakes):
     state = changed(QUIET, **known)
     assert next_deadline(SETTINGS, state, NOW) == pytest.approx(wakes, abs=1e-9)
 
@@ -118,7 +118,7 @@ def test_it_wakes_when_the_first_time_is_over(known: dict[str, Any], wakes: floa
 @pytest.mark.parametrize(
     "stage", [Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED]
 )
-def test_on_the_ground_it_wakes_when_the_vehicle_state_is_just_too_old(stage: Stage) -> None:
+def test_on_the_ground_it_wakes_when_the_vehicle_state_is_just_too_old(stage):
     vehicle = replace(STANDING, armed_age=0.5)
     state = replace(
         QUIET,
@@ -135,7 +135,7 @@ def test_on_the_ground_it_wakes_when_the_vehicle_state_is_just_too_old(stage: St
     assert not flight.fresh(SETTINGS, state, 0.5, wakes)
 
 
-def test_it_wakes_just_after_a_rule_is_fulfilled() -> None:
+def test_it_wakes_just_after_a_rule_is_fulfilled():
     counting = MappingProxyType({"tested": RuleEvidence(0.25, holds=True)})
     wakes = next_deadline(SETTINGS, replace(QUIET, rules=counting), NOW)
     assert 100.75 < wakes < 100.75001
@@ -160,7 +160,7 @@ def judged(story: Story, link: str) -> LinkJudgement:
     return evidence.judged(story.config.limits(link), story.state.own.updated_at)
 
 
-def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_it() -> None:
+def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_it():
     """The first deadline is at 0.5: until then a heartbeat is young. What still waits to be read
     has the limit of 0.25 s to come."""
     story = counting()
@@ -179,9 +179,7 @@ def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_i
 
 
 @given(hang=st.floats(1.0, 3.0), beat=st.floats(0.0, 0.09))
-def test_after_a_hang_of_its_own_the_first_word_of_one_makes_no_other_stale(
-    hang: float, beat: float
-) -> None:
+def test_after_a_hang_of_its_own_the_first_word_of_one_makes_no_other_stale(hang, beat):
     """Given two links that are heard, when it hangs and reads what waits, one after another."""
     story = counting()
     story.at(beat, story.heartbeat())
@@ -193,7 +191,7 @@ def test_after_a_hang_of_its_own_the_first_word_of_one_makes_no_other_stale(
     assert [judged(story, one) for one in (LINK, UPF)] == [LinkJudgement.OK] * 2
 
 
-def test_after_a_hang_of_its_own_who_stays_silent_is_stale_as_soon_as_it_had_the_time() -> None:
+def test_after_a_hang_of_its_own_who_stays_silent_is_stale_as_soon_as_it_had_the_time():
     story = counting()
     story._update((story.heartbeat(UPF),), 3.0)
     story.at(3.2, story.heartbeat(UPF))
@@ -202,7 +200,7 @@ def test_after_a_hang_of_its_own_who_stays_silent_is_stale_as_soon_as_it_had_the
     assert judged(story, LINK) is LinkJudgement.STALE
 
 
-def test_one_that_is_as_late_as_allowed_is_not_late() -> None:
+def test_one_that_is_as_late_as_allowed_is_not_late():
     story = counting()
     story._update((), 0.75)
     assert {one.heard for one in story.state.heard.links.values()} == {START}
@@ -213,7 +211,7 @@ def test_one_that_is_as_late_as_allowed_is_not_late() -> None:
 # -- one that follows ----------------------------------------------------------------------------
 
 
-def test_who_waits_at_one_that_steps_down_is_told_why() -> None:
+def test_who_waits_at_one_that_steps_down_is_told_why():
     story = Story().flying()
     story.at(0.1, i.KillRequest(5, "operator", "stop"))
     story.at(0.2, i.StepDown("it was stopped"))
@@ -222,7 +220,7 @@ def test_who_waits_at_one_that_steps_down_is_told_why() -> None:
     assert story.state.own.leading is False
 
 
-def test_what_is_decided_anew_after_a_takeover_says_so() -> None:
+def test_what_is_decided_anew_after_a_takeover_says_so():
     story = Story().flying()
     story.at(0.1, i.KillRequest(5, "operator", "stop"))
     story.follows()
@@ -234,7 +232,7 @@ def test_what_is_decided_anew_after_a_takeover_says_so() -> None:
     )
 
 
-def test_one_that_follows_knows_since_when_it_is_down_and_what_its_rules_counted() -> None:
+def test_one_that_follows_knows_since_when_it_is_down_and_what_its_rules_counted():
     """So that one that takes over need not begin to count."""
     story = Story(with_rules(rule(SINKS, hold=9.0))).flying()
     story.follows()
@@ -249,7 +247,7 @@ def test_one_that_follows_knows_since_when_it_is_down_and_what_its_rules_counted
 
 
 @pytest.mark.parametrize("blocked", [False, True])
-def test_taking_off_before_it_may_is_an_alarm_in_these_words(blocked: bool) -> None:
+def test_taking_off_before_it_may_is_an_alarm_in_these_words(blocked):
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False))
     if blocked:
@@ -266,7 +264,7 @@ def test_taking_off_before_it_may_is_an_alarm_in_these_words(blocked: bool) -> N
     assert story.state.flight.airborne_since == START + t
 
 
-def test_from_startup_flight_is_blocked_just_when_the_time_of_the_slowest_link_is_over() -> None:
+def test_from_startup_flight_is_blocked_just_when_the_time_of_the_slowest_link_is_over():
     limits = MappingProxyType({UPF: LinkLimits(startup_grace=20.0)})
     story = Story(SupervisorConfig(deploy_links=(LINK, UPF), link_limits=limits))
     story.at(19.9)
@@ -277,7 +275,7 @@ def test_from_startup_flight_is_blocked_just_when_the_time_of_the_slowest_link_i
     assert story.said().endswith(f"({'; '.join(story.newest(BLOCK).reasons)})")
 
 
-def test_a_rule_on_a_link_that_never_started_wakes_when_the_time_of_that_link_is_over() -> None:
+def test_a_rule_on_a_link_that_never_started_wakes_when_the_time_of_that_link_is_over():
     """Given a vehicle that is READY while another parachute, which it may do without, starts."""
     never = LinkCondition(UPF, (LinkJudgement.NEVER_SEEN,))
     watch = rule(never, action=Action.NONE, states=(Stage.READY,))
@@ -290,7 +288,7 @@ def test_a_rule_on_a_link_that_never_started_wakes_when_the_time_of_that_link_is
     assert never.find(config, state, 20.0).holds is True
 
 
-def test_it_stands_since_its_last_contradiction_and_stays_landed_while_it_is_armed() -> None:
+def test_it_stands_since_its_last_contradiction_and_stays_landed_while_it_is_armed():
     story = Story(with_rules(profile={"landed_hold": 0.2})).flying()
     for t, told, since in (
         (0.1, IDLING, START + 0.1),
@@ -304,7 +302,7 @@ def test_it_stands_since_its_last_contradiction_and_stays_landed_while_it_is_arm
     assert story.state.stage is Stage.LANDED
 
 
-def test_a_landing_is_noted_with_its_time_and_ends_what_belonged_to_the_flight() -> None:
+def test_a_landing_is_noted_with_its_time_and_ends_what_belonged_to_the_flight():
     story = Story(with_rules()).flying()
     story.at(0.1, story.told(reboot_count=1, rebooted_in_flight=True))
     assert story.state.flight.rebooted
@@ -328,22 +326,22 @@ def test_a_landing_is_noted_with_its_time_and_ends_what_belonged_to_the_flight()
     ],
 )
 def test_a_deploy_is_worth_it_from_the_minimum_height_or_some_time_after_the_take_off(
-    told: dict[str, float], t: float, high: bool
-) -> None:
+    told, t, high
+):
     story = Story(with_rules(profile={"minimum_height": 10.0})).flying()
     story.noise = -1  # none
     story.at(t, story.told(**told))
     assert story.state.flight.was_high is high
 
 
-def test_one_that_was_high_stays_worth_it() -> None:
+def test_one_that_was_high_stays_worth_it():
     story = Story(with_rules(profile={"minimum_height": 10.0})).fly(1.0, height=50.0)
     story.fly(3.0, height=5.0)
     assert story.state.flight.was_high
 
 
 @pytest.mark.parametrize("secured", [False, True])
-def test_one_that_was_high_has_to_be_so_again_after_the_next_take_off(secured: bool) -> None:
+def test_one_that_was_high_has_to_be_so_again_after_the_next_take_off(secured):
     story = Story(with_rules(profile={"minimum_height": 10.0})).ready().fly(1.0, height=50.0)
     armed = Armed.DISARMED if secured else Armed.ARMED
     down: dict[str, Any] = {"landed_state": LandedState.ON_GROUND, "vertical_speed": 0.0}
@@ -354,7 +352,7 @@ def test_one_that_was_high_has_to_be_so_again_after_the_next_take_off(secured: b
     assert not story.state.flight.was_high
 
 
-def test_on_the_ground_no_height_is_high() -> None:
+def test_on_the_ground_no_height_is_high():
     story = Story(with_rules(profile={"minimum_height": 10.0})).ready()
     story.at(
         0.1, story.told(height=50.0, armed=Armed.DISARMED, landed_state=LandedState.ON_GROUND)
@@ -373,7 +371,7 @@ def at_home(story: Story) -> tuple[float, float] | None:
     return home and (round(home[0], 3), round(home[1], 3))
 
 
-def test_home_is_where_it_took_off_and_anew_after_it_was_secured() -> None:
+def test_home_is_where_it_took_off_and_anew_after_it_was_secured():
     down: dict[str, Any] = {"landed_state": LandedState.ON_GROUND, "armed": Armed.DISARMED}
     story = Story(with_rules()).ready().fly(0.5, **HERE)
     assert at_home(story) == (48.0, 11.0)
@@ -390,7 +388,7 @@ def test_home_is_where_it_took_off_and_anew_after_it_was_secured() -> None:
     assert "height" in told
 
 
-def test_a_bounce_keeps_home_and_how_far_it_is() -> None:
+def test_a_bounce_keeps_home_and_how_far_it_is():
     story = Story(with_rules()).ready().fly(0.5, **HERE)
     story.fly(1.0, **THERE, landed_state=LandedState.ON_GROUND, vertical_speed=0.0)
     assert story.state.stage is Stage.LANDED
@@ -406,8 +404,8 @@ WISH = rule(DeviceCondition(DeviceFact.ASKS_FOR_KILL), action=K, states=(Stage.I
 
 @pytest.mark.parametrize("secured", [False, True])
 def test_what_was_said_of_a_flight_is_said_again_in_the_next_but_not_after_a_bounce(
-    secured: bool,
-) -> None:
+    secured,
+):
     story = Story(with_rules(ALARM)).ready()
     armed = Armed.DISARMED if secured else Armed.ARMED
     for start in (0.0, 2.0):
@@ -420,8 +418,8 @@ def test_what_was_said_of_a_flight_is_said_again_in_the_next_but_not_after_a_bou
 
 @pytest.mark.parametrize("stage", [Stage.READY, Stage.LANDED])
 def test_what_a_device_wished_before_the_flight_is_not_done_in_it_unless_it_bounced(
-    stage: Stage,
-) -> None:
+    stage,
+):
     story = Story(with_rules(WISH)).ready()
     if stage is Stage.LANDED:
         story.at(0.1, i.VehicleReport(FLYING))
@@ -432,7 +430,7 @@ def test_what_a_device_wished_before_the_flight_is_not_done_in_it_unless_it_boun
     assert story.fired() == (["KILL"] if stage is Stage.LANDED else [])
 
 
-def test_who_has_flown_before_is_no_longer_taken_to_have_been_released_before() -> None:
+def test_who_has_flown_before_is_no_longer_taken_to_have_been_released_before():
     """A landed state that was wrong, while the canopy opened: it is out in this flight."""
     story = Story().flying()
     story.at(0.1, i.VehicleReport(IDLING))
@@ -445,8 +443,8 @@ def test_who_has_flown_before_is_no_longer_taken_to_have_been_released_before() 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_what_was_out_on_the_ground_says_nothing_of_the_flight_where_it_is_known_to_stand(
-    known: bool,
-) -> None:
+    known,
+):
     story = Story(SupervisorConfig(require_vehicle_state=False))
     standing = [i.VehicleReport(STANDING)] if known else []
     story.at(0.0, story.heartbeat(), parachute(deployed=True), *standing)
@@ -456,7 +454,7 @@ def test_what_was_out_on_the_ground_says_nothing_of_the_flight_where_it_is_known
     assert story.state.stage is (Stage.IN_FLIGHT if known else Stage.DEPLOYED)
 
 
-def test_nor_does_it_after_a_kill_on_the_ground() -> None:
+def test_nor_does_it_after_a_kill_on_the_ground():
     """KILLING is not of the stages in which it is noted: the test is what opened it."""
     story = Story().ready()
     story.at(0.1, i.KillRequest(5, "operator", "test"))
@@ -474,7 +472,7 @@ def blocks(story: Story) -> list[tuple[Action, tuple[str, ...]]]:
     return [(d.action, d.reasons) for d in story.decisions() if d.action in (BLOCK, RELEASE)]
 
 
-def test_every_link_is_told_that_flight_is_blocked_or_released_and_why() -> None:
+def test_every_link_is_told_that_flight_is_blocked_or_released_and_why():
     story = Story(BOTH)
     story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
     story.at(0.1, story.heartbeat(UPF), story.heartbeat(healthy=False))
@@ -487,13 +485,13 @@ def test_every_link_is_told_that_flight_is_blocked_or_released_and_why() -> None
     assert {(d.rule, d.targets) for d in story.decisions()} == {("links", (LINK, UPF))}
 
 
-def test_nothing_is_decided_twice_in_a_flight() -> None:
+def test_nothing_is_decided_twice_in_a_flight():
     story = Story().flying().fly(1.0)
     assert blocks(story) == [(RELEASE, ("every required link is healthy",))]
     assert story.alarms() == []
 
 
-def test_in_shadow_flight_is_only_said_to_be_blocked_once_the_release_has_arrived() -> None:
+def test_in_shadow_flight_is_only_said_to_be_blocked_once_the_release_has_arrived():
     """One that nobody has confirmed is sent on; a block that was said meanwhile would hide it."""
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False))
@@ -517,7 +515,7 @@ def killed() -> Story:
 
 
 @pytest.mark.parametrize("outcome", [Outcome.CONFIRMED, Outcome.FAILED])
-def test_after_a_kill_on_the_ground_the_block_waits_for_the_kill_to_end(outcome: Outcome) -> None:
+def test_after_a_kill_on_the_ground_the_block_waits_for_the_kill_to_end(outcome):
     story = killed()
     story.at(0.3, story.report(K, Outcome.ACCEPTED))
     assert blocks(story)[-1][0] is RELEASE
@@ -525,14 +523,14 @@ def test_after_a_kill_on_the_ground_the_block_waits_for_the_kill_to_end(outcome:
     assert blocks(story)[-1][0] is BLOCK
 
 
-def test_a_kill_in_flight_is_followed_by_no_block() -> None:
+def test_a_kill_in_flight_is_followed_by_no_block():
     story = Story().flying()
     story.at(0.2, i.KillRequest(5, "operator", "test"))
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
     assert blocks(story)[-1][0] is RELEASE
 
 
-def test_nor_is_one_that_a_deploy_follows() -> None:
+def test_nor_is_one_that_a_deploy_follows():
     story = Story().ready()
     story.at(0.2, story.heartbeat(), i.DeployRequest(5, True, "test"))
     story.at(0.3, story.report(K, Outcome.FAILED))
@@ -543,7 +541,7 @@ def test_nor_is_one_that_a_deploy_follows() -> None:
 # -- killed on the ground, and off all the same --------------------------------------------------
 
 
-def test_one_that_was_killed_on_the_ground_and_arms_again_is_followed_into_the_air() -> None:
+def test_one_that_was_killed_on_the_ground_and_arms_again_is_followed_into_the_air():
     story = killed()
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
     story.at(2.0, i.VehicleReport(FLYING))
@@ -553,7 +551,7 @@ def test_one_that_was_killed_on_the_ground_and_arms_again_is_followed_into_the_a
 
 
 @pytest.mark.parametrize("deploys", [False, True])
-def test_one_whose_kill_has_just_left_has_not_taken_off(deploys: bool) -> None:
+def test_one_whose_kill_has_just_left_has_not_taken_off(deploys):
     """What it says so soon may be from before; and a deploy that is ordered stays ordered."""
     story = killed()
     if deploys:
@@ -562,7 +560,7 @@ def test_one_whose_kill_has_just_left_has_not_taken_off(deploys: bool) -> None:
     assert story.state.stage is Stage.KILLING
 
 
-def test_one_that_was_killed_in_flight_does_not_take_off_again() -> None:
+def test_one_that_was_killed_in_flight_does_not_take_off_again():
     story = Story().flying()
     story.at(0.2, i.KillRequest(5, "operator", "stop"))
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
@@ -588,9 +586,7 @@ def resends(until: float) -> list[float]:
 
 
 @pytest.mark.parametrize(("kill", "deploy"), [(2.0, 1.0), (1.0, 2.0)])
-def test_a_kill_is_sent_again_as_long_as_it_or_the_deploy_can_help(
-    kill: float, deploy: float
-) -> None:
+def test_a_kill_is_sent_again_as_long_as_it_or_the_deploy_can_help(kill, deploy):
     config = SupervisorConfig(kill_timeout=kill, deploy_timeout=deploy, resend_interval=0.25)
     story = Story(config).flying()
     story.at(1.0, i.KillRequest(5, "operator", "stop"))
@@ -598,7 +594,7 @@ def test_a_kill_is_sent_again_as_long_as_it_or_the_deploy_can_help(
     assert again(story, K) == pytest.approx(resends(3.0))
 
 
-def test_a_deploy_is_sent_again_while_it_goes_on_to_whom_has_not_reported() -> None:
+def test_a_deploy_is_sent_again_while_it_goes_on_to_whom_has_not_reported():
     config = SupervisorConfig(deploy_timeout=1.0, resend_interval=0.25)
     story = Story(config).flying()
     story.at(1.0, i.DeployRequest(5, False, "it falls"))
@@ -608,7 +604,7 @@ def test_a_deploy_is_sent_again_while_it_goes_on_to_whom_has_not_reported() -> N
     assert again(story, K) == []
 
 
-def test_a_block_is_sent_again_only_while_a_node_lives_that_has_not_reported() -> None:
+def test_a_block_is_sent_again_only_while_a_node_lives_that_has_not_reported():
     story = Story(BOTH)
     story.at(0.0, story.heartbeat(healthy=False), story.heartbeat(UPF))
     story.at(0.05, story.report(BLOCK, Outcome.SENT))
@@ -627,7 +623,7 @@ def test_a_block_is_sent_again_only_while_a_node_lives_that_has_not_reported() -
     assert 4.0 < again(story, BLOCK)[-1] < 5.0
 
 
-def test_a_value_that_is_no_more_than_nothing_has_no_sign() -> None:
+def test_a_value_that_is_no_more_than_nothing_has_no_sign():
     stuck = Measured(value=-0.0, measured_at=100.0, same_since=90.0, count=9)
     assert stuck.unusable(STANDARD_LIMITS["vertical_speed"], 100.0).startswith(
         "stuck at 0 for 10.0 s"

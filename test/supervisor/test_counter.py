@@ -46,11 +46,11 @@ def fulfilled(pattern: str, one: Rule = RULE) -> list[int]:
         ("x" + "-" * 30 + "x-x", [33]),
     ],
 )
-def test_it_is_fulfilled_when_it_is_full_of_enough_samples(pattern: str, at: list[int]) -> None:
+def test_it_is_fulfilled_when_it_is_full_of_enough_samples(pattern, at):
     assert fulfilled(pattern) == at
 
 
-def test_without_a_hold_it_is_fulfilled_at_once_and_without_measurements_without_samples() -> None:
+def test_without_a_hold_it_is_fulfilled_at_once_and_without_measurements_without_samples():
     assert fulfilled("x", rule(SINKS)) == [0]
     evidence = RuleEvidence()
     for _ in range(12):
@@ -58,14 +58,14 @@ def test_without_a_hold_it_is_fulfilled_at_once_and_without_measurements_without
     assert evidence.fulfilled(RULE)
 
 
-def test_a_good_sample_does_not_reset_it() -> None:
+def test_a_good_sample_does_not_reset_it():
     # Full at 1.0 s of bad samples; the good one costs 0.05 s of leak, which one more look pays.
     assert fulfilled("xxxxxxxx.xxxx") == [12]
     assert counted("xxxxxxxx.")[-1].level == pytest.approx(0.8)
     assert counted("xxxxxxxx.x")[-1].level == pytest.approx(0.75)
 
 
-def test_it_leaks_to_nothing_and_not_below() -> None:
+def test_it_leaks_to_nothing_and_not_below():
     levels = [one.level for one in counted("xx.........x")]
     assert levels[2] == pytest.approx(0.2)
     assert levels[6] == pytest.approx(0.0)
@@ -73,12 +73,12 @@ def test_it_leaks_to_nothing_and_not_below() -> None:
     assert levels[-1] == 0.0
 
 
-def test_it_does_not_count_beyond_full_so_that_it_leaks_at_once() -> None:
+def test_it_does_not_count_beyond_full_so_that_it_leaks_at_once():
     assert counted("x" * 100)[-1].level == 1.0
     assert counted("x" * 100 + "..")[-1].level == pytest.approx(0.95)
 
 
-def test_a_sample_that_denies_it_takes_the_leak_of_one_away() -> None:
+def test_a_sample_that_denies_it_takes_the_leak_of_one_away():
     assert counted("xx.")[-1].shown == (1.5,)
     assert counted("xx...")[-1].shown == (0.5,)
     assert counted("xx......")[-1].shown == (0.0,)
@@ -86,7 +86,7 @@ def test_a_sample_that_denies_it_takes_the_leak_of_one_away() -> None:
     assert fulfilled("xxx.xx.xx.xx.xxxx") == [16], "two of three are enough"
 
 
-def test_samples_of_another_condition_do_not_count_for_it() -> None:
+def test_samples_of_another_condition_do_not_count_for_it():
     both = rule(SINKS, TILTS, samples=3)
     evidence = RuleEvidence()
     for n in range(10):
@@ -99,7 +99,7 @@ def test_samples_of_another_condition_do_not_count_for_it() -> None:
     assert evidence.fulfilled(both)
 
 
-def test_what_was_shown_before_the_rule_held_counts() -> None:
+def test_what_was_shown_before_the_rule_held_counts():
     """A battery tells once a second; a fall must not wait for three more."""
     both = rule(SINKS, TILTS, samples=3)
     evidence = RuleEvidence()
@@ -112,7 +112,7 @@ def test_what_was_shown_before_the_rule_held_counts() -> None:
     assert evidence.fulfilled(both)
 
 
-def test_one_wrong_sample_beside_a_battery_that_is_dead_fires_nothing() -> None:
+def test_one_wrong_sample_beside_a_battery_that_is_dead_fires_nothing():
     story = Story(shipped("multirotor")).ready().fly(2.0, battery_remaining=0.04)
     story.fly(2.05, battery_remaining=0.04, vertical_speed=-8.0)
     silent = {"vertical_speed": math.nan, "vertical_speed_age": math.nan}
@@ -120,20 +120,20 @@ def test_one_wrong_sample_beside_a_battery_that_is_dead_fires_nothing() -> None:
     assert story.fired() == []
 
 
-def test_a_rule_of_the_same_name_with_other_conditions_begins_anew() -> None:
+def test_a_rule_of_the_same_name_with_other_conditions_begins_anew():
     before = counted("x" * 20)[-1]
     other = rule(SINKS, TILTS, hold=1.0, samples=3)
     assert before.seeing(other, [Look(True, 50), Look(True, 50)]).shown == (1.0, 1.0)
 
 
-def test_it_has_cleared_once_it_is_empty_and_does_not_hold() -> None:
+def test_it_has_cleared_once_it_is_empty_and_does_not_hold():
     evidence = counted("x" * 11)[-1]
     assert not evidence.cleared()
     assert not evidence.seeing(RULE, [Look(False, 99)]).cleared()
     assert counted("x" * 11 + "." * 22)[-1].cleared()
 
 
-def test_it_wakes_the_core_when_it_will_be_full_and_when_empty_but_at_rest_never() -> None:
+def test_it_wakes_the_core_when_it_will_be_full_and_when_empty_but_at_rest_never():
     half = counted("x" + "-" * 5)[-1]
     assert half.deadline(RULE, 7.0) == pytest.approx(7.5)
     assert counted("x" * 13)[-1].deadline(RULE, 7.0) == math.inf
@@ -150,9 +150,7 @@ def test_it_wakes_the_core_when_it_will_be_full_and_when_empty_but_at_rest_never
     st.floats(0.0, 3.0),
     st.floats(0.0, 2.0),
 )
-def test_its_level_is_that_of_the_seconds_told_and_stays_between_empty_and_full(
-    told: list[tuple[float, bool]], hold: float, leak: float
-) -> None:
+def test_its_level_is_that_of_the_seconds_told_and_stays_between_empty_and_full(told, hold, leak):
     one = rule(SINKS, hold=hold, leak=leak)
     evidence, level = RuleEvidence(), 0.0
     for seen, (passed, holds) in enumerate(told):
@@ -167,7 +165,7 @@ def test_its_level_is_that_of_the_seconds_told_and_stays_between_empty_and_full(
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=30), st.floats(0.0, 1.0))
-def test_more_bad_samples_never_make_it_less_likely(bad: list[bool], leak: float) -> None:
+def test_more_bad_samples_never_make_it_less_likely(bad, leak):
     one = rule(SINKS, hold=1.0, leak=leak)
     before = counted("".join("x" if b else "." for b in bad), one)
     for n in range(len(bad)):
@@ -176,7 +174,7 @@ def test_more_bad_samples_never_make_it_less_likely(bad: list[bool], leak: float
         assert after[-1].level >= before[-1].level - 1e-9
 
 
-def test_an_attitude_that_swings_through_the_upright_is_counted_all_the_same() -> None:
+def test_an_attitude_that_swings_through_the_upright_is_counted_all_the_same():
     story = Story(with_rules(rule(SINKS, hold=0.5, leak=0.5, samples=3))).flying()
     for _ in range(10):
         story.fly(story.t + 0.2, vertical_speed=-14.0)
@@ -186,7 +184,7 @@ def test_an_attitude_that_swings_through_the_upright_is_counted_all_the_same() -
     assert story.when(story.decisions()[-1].action) < 1.5
 
 
-def test_while_nobody_looked_nothing_is_counted() -> None:
+def test_while_nobody_looked_nothing_is_counted():
     story = Story(with_rules(rule(SINKS, hold=1.0))).flying()
     story.fly(0.1, vertical_speed=-14.0)
     story._update((story.told(vertical_speed=-14.0),), 3.0)  # 2.9 s without a look
@@ -207,13 +205,13 @@ def noisy(sink: list[bool | None]) -> list[float]:
     return levels
 
 
-def test_what_cannot_be_said_keeps_what_it_has_shown() -> None:
+def test_what_cannot_be_said_keeps_what_it_has_shown():
     levels = noisy([True] * 10 + [None] * 40)
     assert levels[10:15] == pytest.approx([0.2] * 5)
     assert levels[-1] == pytest.approx(0.34)
 
 
-def test_what_cannot_be_said_and_had_shown_nothing_keeps_nothing() -> None:
+def test_what_cannot_be_said_and_had_shown_nothing_keeps_nothing():
     """Else the few bad ones of a sensor that is noise add up beside one that is silent."""
     assert max(noisy([False] * 10 + [None] * 200)) <= 0.02 + 1e-9
 
@@ -226,7 +224,7 @@ BOTH = rule(TILTS, SINKS)
 UNKNOWN = RuleEvidence(level=1.0, holds=None, shown=(2.0,), seen=(5,))
 
 
-def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word() -> None:
+def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word():
     once = UNKNOWN.counted(SLOW, 1.0)
     assert (once.unknown, once.level, once.shown) == (1.0, 1.0, (2.0,))
     assert once.counted(SLOW, 0.5).unknown == 1.5
@@ -235,26 +233,26 @@ def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word() -> None:
         assert once.seeing(SLOW, [Look(holds, 6)]).counted(SLOW, 0.5).unknown == 0.0
 
 
-def test_past_its_stand_it_leaks_for_as_long_as_it_is_past() -> None:
+def test_past_its_stand_it_leaks_for_as_long_as_it_is_past():
     nearly = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS - 0.5)
     assert nearly.counted(SLOW, 1.0).level == 0.75
     past = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS + 1.0)
     assert past.counted(SLOW, 1.0).level == 0.5
 
 
-def test_what_cannot_be_said_shows_nothing_and_denies_nothing() -> None:
+def test_what_cannot_be_said_shows_nothing_and_denies_nothing():
     assert UNKNOWN.seeing(SLOW, [Look(None, 6)]).shown == (2.0,)
     assert UNKNOWN.seeing(SLOW, [Look(None, 6)]).holds is None
 
 
-def test_a_sample_counts_once_also_where_none_has_come_so_far() -> None:
+def test_a_sample_counts_once_also_where_none_has_come_so_far():
     first = RuleEvidence().seeing(SLOW, [Look(True, 0)])
     assert (first.shown, first.seen) == ((1.0,), (0,))
     assert first.seeing(SLOW, [Look(True, 0)]).shown == (1.0,)
 
 
 @pytest.mark.parametrize(("seen", "enough"), [(-1, True), (0, False), (1, False)])
-def test_only_what_has_no_samples_needs_none(seen: int, enough: bool) -> None:
+def test_only_what_has_no_samples_needs_none(seen, enough):
     full = RuleEvidence(level=2.0, shown=(1.0,), seen=(0,)).seeing(SLOW, [Look(True, seen)])
     assert full.holds
     assert full.fulfilled(SLOW) is enough
@@ -281,14 +279,12 @@ def test_only_what_has_no_samples_needs_none(seen: int, enough: bool) -> None:
         (rule(replace(SINKS, weight=2.0 - 1e-9), needed=2.0), [Look(True, 1)], True),
     ],
 )
-def test_it_holds_with_enough_weight_and_cannot_be_said_where_the_rest_could_be(
-    one: Rule, looks: list[Look], holds: bool | None
-) -> None:
+def test_it_holds_with_enough_weight_and_cannot_be_said_where_the_rest_could_be(one, looks, holds):
     evidence = RuleEvidence().seeing(one, looks)
     assert evidence.holds is holds
 
 
-def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> None:
+def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure():
     one = rule(LIGHT, HEAVY, needed=2.0, samples=2)
     evidence = RuleEvidence().seeing(one, [Look(True, 1), Look(True, 1)])
     assert not evidence.seeing(one, [Look(True, 2), Look(True, 1)]).fulfilled(one)
@@ -296,12 +292,12 @@ def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> Non
     assert not evidence.seeing(one, [Look(True, 2), Look(False, 2)]).fulfilled(one)
 
 
-def test_weights_that_miss_by_the_rounding_are_sure_as_well() -> None:
+def test_weights_that_miss_by_the_rounding_are_sure_as_well():
     one = rule(SINKS, needed=1.0 + 1e-9)
     assert RuleEvidence().seeing(one, [Look(True, -1)]).fulfilled(one)
 
 
-def test_the_rounding_itself_is_full_and_empty() -> None:
+def test_the_rounding_itself_is_full_and_empty():
     shortest = rule(SINKS, hold=1e-6, samples=0)
     assert RuleEvidence(level=0.0, sure=True).fulfilled(shortest)
     assert RuleEvidence(level=1e-6).cleared()
@@ -309,9 +305,7 @@ def test_the_rounding_itself_is_full_and_empty() -> None:
 
 
 @pytest.mark.parametrize(("unknown", "stands"), [(1.0, 2.0), (4.0, 0.0)])
-def test_while_nothing_can_be_said_it_is_empty_after_its_stand(
-    unknown: float, stands: float
-) -> None:
+def test_while_nothing_can_be_said_it_is_empty_after_its_stand(unknown, stands):
     waiting = RuleEvidence(level=1.0, holds=None, latched=True, unknown=unknown)
     assert waiting.deadline(SLOW, 10.0) == 12.0 + stands
     known = RuleEvidence(level=1.0, holds=False, latched=True, unknown=unknown)
@@ -319,27 +313,27 @@ def test_while_nothing_can_be_said_it_is_empty_after_its_stand(
     assert RuleEvidence(level=1.0, holds=None).deadline(SLOW, 10.0) == math.inf
 
 
-def test_what_is_in_doubt_is_not_sure() -> None:
+def test_what_is_in_doubt_is_not_sure():
     for doubted in (False, True):
         evidence = RuleEvidence().seeing(rule(SINKS, doubted=0.5), [Look(True, 1, doubted)])
         assert evidence.sure is not doubted
 
 
 @pytest.mark.parametrize("lost", [None, False])
-def test_what_is_not_counted_is_waited_for_and_must_be_so_at_the_end(lost: bool | None) -> None:
+def test_what_is_not_counted_is_waited_for_and_must_be_so_at_the_end(lost):
     one = rule(LOST, SINKS)
     evidence = RuleEvidence().seeing(one, [Look(lost), Look(True, 1)])
     assert (evidence.holds, evidence.sure) == (True, False)
     assert evidence.seeing(one, [Look(True), Look(True, 1)]).sure
 
 
-def test_one_sample_that_showed_it_is_enough_to_stand() -> None:
+def test_one_sample_that_showed_it_is_enough_to_stand():
     shown = RuleEvidence().seeing(rule(SINKS, samples=3), [Look(True, 1)])
     assert shown.shown == (1.0,)
     assert shown.seeing(rule(SINKS, samples=3), [Look(None, 1)]).holds is None
 
 
-def test_what_was_shown_stands_while_nothing_can_be_said_and_adds_up_with_what_is_so() -> None:
+def test_what_was_shown_stands_while_nothing_can_be_said_and_adds_up_with_what_is_so():
     evidence = RuleEvidence().seeing(BOTH, [Look(True, 1), Look(True, 1)])
     looks = [Look(True, 2), Look(None, 1)]
     for seen in (looks, looks[::-1]):
@@ -349,7 +343,7 @@ def test_what_was_shown_stands_while_nothing_can_be_said_and_adds_up_with_what_i
     assert shown.seeing(almost, [Look(None, 0)]).holds is None
 
 
-def test_a_look_that_shows_nothing_new_changes_nothing() -> None:
+def test_a_look_that_shows_nothing_new_changes_nothing():
     """Most of them: nothing is made anew for it."""
     evidence = RuleEvidence().seeing(BOTH, [Look(True, 1), Look(True, 1)])
     assert evidence.seeing(BOTH, [Look(True, 1), Look(True, 1)]) is evidence
@@ -357,7 +351,7 @@ def test_a_look_that_shows_nothing_new_changes_nothing() -> None:
         assert evidence.seeing(rule(TILTS, SINKS, doubted=0.5), looks) is not evidence
 
 
-def test_a_sample_more_of_what_is_shown_enough_is_still_seen() -> None:
+def test_a_sample_more_of_what_is_shown_enough_is_still_seen():
     one = rule(SINKS, samples=1)
     evidence = RuleEvidence().seeing(one, [Look(True, 1)])
     later = evidence.seeing(one, [Look(True, 2)])

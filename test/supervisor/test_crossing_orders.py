@@ -46,7 +46,7 @@ def killing(asked: i.KillRequest, *outcomes: Outcome, t: float = 1.1) -> Story:
 # -- a kill that is asked for again --------------------------------------------------------------
 
 
-def test_a_kill_that_was_given_up_is_sent_anew_when_asked_for_again() -> None:
+def test_a_kill_that_was_given_up_is_sent_anew_when_asked_for_again():
     story = killing(STOP)
     story.at(30.0)
     assert "the motors may still turn" in story.alarms()[0]
@@ -57,14 +57,14 @@ def test_a_kill_that_was_given_up_is_sent_anew_when_asked_for_again() -> None:
     assert story.answer(2).success
 
 
-def test_a_person_who_sees_motors_turn_after_a_confirmed_kill_is_obeyed_again() -> None:
+def test_a_person_who_sees_motors_turn_after_a_confirmed_kill_is_obeyed_again():
     story = killing(STOP, Outcome.CONFIRMED)
     story.at(2.0, i.KillRequest(2, "operator", "they turn"))
     assert len(story.decisions(K)) == 2
     assert story.answers(2) == []
 
 
-def test_a_device_that_repeats_its_request_makes_no_new_decision_each_time() -> None:
+def test_a_device_that_repeats_its_request_makes_no_new_decision_each_time():
     story = Story().flying()
     for tick in range(30):
         story.at(1.0 + tick * 0.1, DEVICE_ASKS)
@@ -83,16 +83,14 @@ def test_a_device_that_repeats_its_request_makes_no_new_decision_each_time() -> 
         (Outcome.FAILED, 1.05, 1.06, 1.5),
     ],
 )
-def test_a_device_that_asks_again_is_obeyed_again_at_the_limit(
-    outcome: Outcome, at: float, too_early: float, again: float
-) -> None:
+def test_a_device_that_asks_again_is_obeyed_again_at_the_limit(outcome, at, too_early, again):
     story = killing(DEVICE_ASKS, outcome, t=at)
     for t, kills in ((too_early, 1), (again, 2)):
         story.at(t, DEVICE_ASKS)
         assert len(story.decisions(K)) == kills
 
 
-def test_a_device_that_asks_while_the_motors_turn_again_is_obeyed_again() -> None:
+def test_a_device_that_asks_while_the_motors_turn_again_is_obeyed_again():
     """A kill was confirmed, and undone since: the vehicle says that it is armed."""
     story = killing(DEVICE_ASKS, Outcome.CONFIRMED)
     story.at(3.0, i.VehicleReport(replace(FLYING, armed=Armed.DISARMED)))
@@ -106,16 +104,14 @@ def test_a_device_that_asks_while_the_motors_turn_again_is_obeyed_again() -> Non
 @pytest.mark.parametrize(
     ("after", "age", "kills"), [(0.2, 0.0, 1), (0.25, 0.0, 2), (1.0, 0.75, 2), (1.0, 0.9, 1)]
 )
-def test_only_what_the_vehicle_says_well_after_the_kill_undoes_it(
-    after: float, age: float, kills: int
-) -> None:
+def test_only_what_the_vehicle_says_well_after_the_kill_undoes_it(after, age, kills):
     story = killing(DEVICE_ASKS, Outcome.CONFIRMED)
     said = (START + 1.0 + after) - START
     story.at(said, i.VehicleReport(replace(FLYING, armed_age=age)), DEVICE_ASKS)
     assert len(story.decisions(K)) == kills
 
 
-def test_a_device_that_repeats_its_request_cannot_put_off_the_answer_to_a_person() -> None:
+def test_a_device_that_repeats_its_request_cannot_put_off_the_answer_to_a_person():
     story = Story().flying()
     story.at(1.0, OUT)
     story.at(1.0, STOP)
@@ -124,7 +120,7 @@ def test_a_device_that_repeats_its_request_cannot_put_off_the_answer_to_a_person
     assert not story.answer(1).success
 
 
-def test_a_kill_that_fails_and_is_asked_for_again_and_again_does_not_put_off_the_deploy() -> None:
+def test_a_kill_that_fails_and_is_asked_for_again_and_again_does_not_put_off_the_deploy():
     story = Story().ordered()
     for tick in range(1, 12):
         story.at(1.0 + tick * 0.05, story.report(K, Outcome.FAILED, detail="no autopilot"))
@@ -132,7 +128,7 @@ def test_a_kill_that_fails_and_is_asked_for_again_and_again_does_not_put_off_the
     assert story.when(D) == pytest.approx(1.5)
 
 
-def test_a_kill_that_a_device_asks_for_and_nobody_confirms_is_an_alarm() -> None:
+def test_a_kill_that_a_device_asks_for_and_nobody_confirms_is_an_alarm():
     story = killing(DEVICE_ASKS)
     story.at(1.1, story.report(K, Outcome.FAILED, detail="no autopilot"))
     story.at(30.0)
@@ -141,7 +137,7 @@ def test_a_kill_that_a_device_asks_for_and_nobody_confirms_is_an_alarm() -> None
     ]
 
 
-def test_a_confirmation_after_a_failure_counts_and_a_failure_after_it_undoes_nothing() -> None:
+def test_a_confirmation_after_a_failure_counts_and_a_failure_after_it_undoes_nothing():
     story = Story().ordered()
     story.at(1.1, story.report(K, Outcome.FAILED))
     story.at(1.2, story.report(K, Outcome.CONFIRMED))
@@ -152,7 +148,7 @@ def test_a_confirmation_after_a_failure_counts_and_a_failure_after_it_undoes_not
     assert story.alarms() == []
 
 
-def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight() -> None:
+def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight():
     story = Story().ready()
     story.at(0.1, i.DeployRequest(5, True, "test"))
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
@@ -179,8 +175,8 @@ def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight() -> None:
     ],
 )
 def test_a_deploy_after_a_kill_leaves_at_once_if_that_was_confirmed_or_kills_once_more(
-    outcomes: tuple[Outcome, ...], asked: float, deployed: float, kills: int
-) -> None:
+    outcomes, asked, deployed, kills
+):
     story = killing(STOP, *outcomes)
     story.at(asked, i.DeployRequest(2, False, "and now"))
     assert len(story.decisions(K)) == kills
@@ -188,7 +184,7 @@ def test_a_deploy_after_a_kill_leaves_at_once_if_that_was_confirmed_or_kills_onc
     assert story.when(D) == pytest.approx(deployed)
 
 
-def test_a_second_deploy_request_while_the_kill_runs_does_not_put_the_first_off() -> None:
+def test_a_second_deploy_request_while_the_kill_runs_does_not_put_the_first_off():
     story = Story().ordered()
     story.at(1.1, story.report(K, Outcome.FAILED))
     story.at(1.4, i.DeployRequest(6, False, "now!"))
@@ -197,7 +193,7 @@ def test_a_second_deploy_request_while_the_kill_runs_does_not_put_the_first_off(
     assert len(story.decisions(K)) == 1
 
 
-def test_a_person_who_joins_a_rules_deploy_is_held_back_by_no_height() -> None:
+def test_a_person_who_joins_a_rules_deploy_is_held_back_by_no_height():
     minimum: dict[str, Any] = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
     story = Story(with_rules(rule(SINKS), profile=minimum)).flying().fly(0.95, height=11.0)
     story.at(1.0, story.told(height=11.0, vertical_speed=-13.0))
@@ -218,7 +214,7 @@ def test_a_person_who_joins_a_rules_deploy_is_held_back_by_no_height() -> None:
     assert story.answer(6).success
 
 
-def test_a_rule_that_joins_a_persons_deploy_leaves_it_theirs() -> None:
+def test_a_rule_that_joins_a_persons_deploy_leaves_it_theirs():
     story = Story(with_rules(rule(SINKS))).ordered()
     story.at(1.1, story.told(vertical_speed=-13.0))
     story.at(1.6)
@@ -229,7 +225,7 @@ def test_a_rule_that_joins_a_persons_deploy_leaves_it_theirs() -> None:
 @pytest.mark.parametrize(
     "said", [{"landed_state": LandedState.ON_GROUND}, {"armed": Armed.DISARMED}]
 )
-def test_what_it_said_before_a_kill_is_not_its_effect(said: dict[str, Any]) -> None:
+def test_what_it_said_before_a_kill_is_not_its_effect(said):
     for before, fired in ((said, ["KILL"]), ({}, ["KILL", "DEPLOY"])):
         story = Story(with_rules(rule(TILTS), profile={"landed_hold": 5.0})).flying()
         story.fly(0.95).fly(1.95, **before)
@@ -242,7 +238,7 @@ def test_what_it_said_before_a_kill_is_not_its_effect(said: dict[str, Any]) -> N
 # -- refused as older ----------------------------------------------------------------------------
 
 
-def test_a_kill_that_a_node_missed_and_then_refuses_as_older_gets_a_new_number() -> None:
+def test_a_kill_that_a_node_missed_and_then_refuses_as_older_gets_a_new_number():
     for outcome in (None, Outcome.SENT):
         story = Story().ordered()
         first = story.newest(K)
@@ -262,7 +258,7 @@ def test_a_kill_that_a_node_missed_and_then_refuses_as_older_gets_a_new_number()
         assert story.state.stage is Stage.DEPLOYED
 
 
-def test_a_report_that_says_nothing_is_no_report() -> None:
+def test_a_report_that_says_nothing_is_no_report():
     story = Story().deploying()
     story.at(1.15, story.report(D, Outcome.NONE))
     story.at(1.25)
@@ -281,8 +277,8 @@ def test_a_report_that_says_nothing_is_no_report() -> None:
     ],
 )
 def test_a_device_that_has_begun_under_the_old_epoch_is_not_told_to_begin_again(
-    outcome: Outcome, stage: Stage, deploys: int
-) -> None:
+    outcome, stage, deploys
+):
     story = Story().deploying()
     number = story.newest(D).id
     story.at(1.2, i.ActionReport(7, number, LINK, outcome, "told", newest_epoch=900))
@@ -297,7 +293,7 @@ def test_a_device_that_has_begun_under_the_old_epoch_is_not_told_to_begin_again(
     assert story.answer(5).success is not refused
 
 
-def test_a_restart_of_a_node_that_deploys_nothing_fires_nothing_again() -> None:
+def test_a_restart_of_a_node_that_deploys_nothing_fires_nothing_again():
     story = Story(SupervisorConfig(required_links=(LINK, "umbilical")))
     beat = i.LinkHeartbeat("umbilical", LinkState.OK, True, 50)
     story.at(0.0, story.heartbeat(), beat, i.VehicleReport(FLYING))
@@ -309,7 +305,7 @@ def test_a_restart_of_a_node_that_deploys_nothing_fires_nothing_again() -> None:
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_flight_block_does_not_overtake_a_deploy_on_its_way() -> None:
+def test_a_flight_block_does_not_overtake_a_deploy_on_its_way():
     story = Story(TWO).deploying()
     story.seq = -1
     before = len(story.decisions())
@@ -320,7 +316,7 @@ def test_a_flight_block_does_not_overtake_a_deploy_on_its_way() -> None:
 # -- when it ends --------------------------------------------------------------------------------
 
 
-def test_nothing_more_is_sent_of_a_deploy_that_was_given_up_or_once_a_parachute_is_out() -> None:
+def test_nothing_more_is_sent_of_a_deploy_that_was_given_up_or_once_a_parachute_is_out():
     story = Story(SupervisorConfig(deploy_timeout=2.0, kill_timeout=6.0)).deploying()
     story.at(3.2)
     assert story.state.stage is Stage.FAULT
@@ -332,14 +328,14 @@ def test_nothing_more_is_sent_of_a_deploy_that_was_given_up_or_once_a_parachute_
         assert not [o for _, o in one.outputs[count:] if isinstance(o, i.Decide)]
 
 
-def test_at_rest_nothing_wakes_it() -> None:
+def test_at_rest_nothing_wakes_it():
     story = Story().deploying()
     story.at(1.2, story.report(D, Outcome.CONFIRMED))
     story.at(30.0)
     assert math.isinf(next_deadline(story.config, story.state, START + story.t))
 
 
-def test_the_same_alarm_is_kept_once_and_said_each_time() -> None:
+def test_the_same_alarm_is_kept_once_and_said_each_time():
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False))
     story.at(11.0)
@@ -362,7 +358,7 @@ def out_before() -> Story:
     return story
 
 
-def test_one_that_was_out_before_the_flight_stops_no_motors_also_if_it_was_lost_a_while() -> None:
+def test_one_that_was_out_before_the_flight_stops_no_motors_also_if_it_was_lost_a_while():
     story = out_before()
     assert story.decisions(K) == []
     story.at(0.3, parachute(UPF, "33", True, alive=False))
@@ -370,7 +366,7 @@ def test_one_that_was_out_before_the_flight_stops_no_motors_also_if_it_was_lost_
     assert story.decisions(K) == []
 
 
-def test_one_that_was_out_before_the_flight_does_not_stand_for_the_one_that_is_needed() -> None:
+def test_one_that_was_out_before_the_flight_does_not_stand_for_the_one_that_is_needed():
     story = out_before()
     story.at(1.0, i.DeployRequest(5, False, "it falls"), story.heartbeat())
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
@@ -381,7 +377,7 @@ def test_one_that_was_out_before_the_flight_does_not_stand_for_the_one_that_is_n
     assert story.answer(5).success
 
 
-def test_one_that_is_packed_again_counts_again() -> None:
+def test_one_that_is_packed_again_counts_again():
     story = Story(TWO).ready()
     story.at(0.1, OTHER_OUT, i.VehicleReport(STANDING))
     story.at(0.2, parachute(UPF, "33"))
@@ -391,7 +387,7 @@ def test_one_that_is_packed_again_counts_again() -> None:
     assert len(story.decisions(K)) == 1
 
 
-def test_under_an_open_canopy_the_motors_stop_whatever_starts_or_is_wrong_meanwhile() -> None:
+def test_under_an_open_canopy_the_motors_stop_whatever_starts_or_is_wrong_meanwhile():
     starts = Story()
     starts.at(0.0, starts.heartbeat(healthy=False), OUT, i.VehicleReport(FLYING))
     wrong = Story().flying()
@@ -402,7 +398,7 @@ def test_under_an_open_canopy_the_motors_stop_whatever_starts_or_is_wrong_meanwh
         assert len(story.decisions(K)) == 1
 
 
-def test_motors_that_are_armed_again_under_a_canopy_are_stopped_again() -> None:
+def test_motors_that_are_armed_again_under_a_canopy_are_stopped_again():
     story = Story().deploying()
     story.at(1.2, OUT, story.report(K, Outcome.CONFIRMED))
     assert story.state.stage is Stage.DEPLOYED
@@ -421,14 +417,14 @@ def test_motors_that_are_armed_again_under_a_canopy_are_stopped_again() -> None:
     assert len(story.decisions(K)) == 3
 
 
-def test_an_armed_state_of_before_the_kill_stops_no_motors_twice() -> None:
+def test_an_armed_state_of_before_the_kill_stops_no_motors_twice():
     story = Story().deploying()
     story.at(1.2, OUT, story.report(K, Outcome.CONFIRMED), i.VehicleReport(FLYING))
     story.at(1.4, OUT, i.VehicleReport(replace(FLYING, armed_age=0.35)))
     assert len(story.decisions(K)) == 1
 
 
-def test_a_forced_test_on_the_ground_is_not_answered_by_what_was_out_before() -> None:
+def test_a_forced_test_on_the_ground_is_not_answered_by_what_was_out_before():
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False), OUT)
     story.at(0.1, i.DeployRequest(1, True, "test"))
@@ -437,7 +433,7 @@ def test_a_forced_test_on_the_ground_is_not_answered_by_what_was_out_before() ->
     assert len(story.decisions(D)) == 1
 
 
-def test_after_a_reset_what_is_out_is_known_to_be_out() -> None:
+def test_after_a_reset_what_is_out_is_known_to_be_out():
     story = Story().deploying()
     story.at(1.2, OUT)
     story.at(20.0, i.VehicleReport(STANDING))
@@ -451,7 +447,7 @@ def test_after_a_reset_what_is_out_is_known_to_be_out() -> None:
 # -- what is refused, and what not ---------------------------------------------------------------
 
 
-def test_a_reset_without_a_vehicle_state_does_not_stop_a_deploy_on_its_way() -> None:
+def test_a_reset_without_a_vehicle_state_does_not_stop_a_deploy_on_its_way():
     story = Story().ordered()
     story.state = changed(story.state, vehicle_received=math.nan)
     story.at(1.1, i.ResetRequest(2))
@@ -460,9 +456,7 @@ def test_a_reset_without_a_vehicle_state_does_not_stop_a_deploy_on_its_way() -> 
     assert len(story.decisions(D)) == 1
 
 
-def test_a_parachute_is_disarmed_on_the_ground_after_a_kill_but_not_while_a_deploy_goes_on() -> (
-    None
-):
+def test_a_parachute_is_disarmed_on_the_ground_after_a_kill_but_not_while_a_deploy_goes_on():
     story = killing(STOP)
     story.at(1.1, i.ArmRequest(2, False, 0))
     assert "not disarmed in flight" in story.answer(2).message
@@ -473,7 +467,7 @@ def test_a_parachute_is_disarmed_on_the_ground_after_a_kill_but_not_while_a_depl
     assert "not disarmed in flight" in story.answer(3).message
 
 
-def test_in_shadow_all_that_would_have_been_done_is_said_with_its_rule_and_reasons() -> None:
+def test_in_shadow_all_that_would_have_been_done_is_said_with_its_rule_and_reasons():
     story = Story(with_rules(rule(SINKS)), mode=i.Mode.SHADOW).flying()
     story.at(0.1, STOP)
     story.at(0.2, i.DeployRequest(6, False, "it falls"))
@@ -492,7 +486,7 @@ def test_in_shadow_all_that_would_have_been_done_is_said_with_its_rule_and_reaso
 
 
 @pytest.mark.parametrize("wanted", [K, D])
-def test_the_log_says_what_a_rule_saw(wanted: Action) -> None:
+def test_the_log_says_what_a_rule_saw(wanted):
     seen = rule(SINKS, action=wanted, hold=0.5, samples=3)
     story = Story(with_rules(seen)).flying().fly(1.0, vertical_speed=-13.0)
     (kill,) = story.decisions(K)
@@ -502,6 +496,6 @@ def test_the_log_says_what_a_rule_saw(wanted: Action) -> None:
     assert f"IN_FLIGHT -> KILLING: a kill was decided ({'; '.join(kill.reasons)})" in story.said()
 
 
-def test_the_log_says_what_a_person_wanted() -> None:
+def test_the_log_says_what_a_person_wanted():
     said = killing(STOP).said()
     assert "IN_FLIGHT -> KILLING: a kill was decided (operator: stop)" in said

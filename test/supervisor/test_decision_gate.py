@@ -92,8 +92,8 @@ KILL, DEPLOY = kind(Action.KILL, 7, 2), kind(Action.DEPLOY, 7, 3)
     ],
 )
 def test_each_decision_is_judged_by_those_before_it(
-    told: list[tuple[Decision, float, DecisionVerdict]],
-) -> None:
+    told,
+):
     one = gate()
     for each, age, verdict in told:
         assert one.judge(each, age) is verdict, (each, age)
@@ -101,7 +101,7 @@ def test_each_decision_is_judged_by_those_before_it(
         assert (one.newest_epoch, one.newest_id) == (7, 3)
 
 
-def test_who_led_before_another_decided_for_others_is_not_obeyed() -> None:
+def test_who_led_before_another_decided_for_others_is_not_obeyed():
     one = gate()
     assert one.judge(decision(5, 3), 0.0) is DecisionVerdict.ACT
     assert one.judge(decision(6, 9, OTHERS), 0.5) is DecisionVerdict.NOT_ADDRESSED
@@ -121,8 +121,8 @@ def test_who_led_before_another_decided_for_others_is_not_obeyed() -> None:
     )
 )
 def test_no_decision_is_ever_acted_on_twice_nor_out_of_order(
-    sent: list[tuple[int, int, bool, float, bool]],
-) -> None:
+    sent,
+):
     one, acted = gate(), []
     for epoch, number, ours, age, shadow in sent:
         targets = (LINK,) if ours else ("other",)

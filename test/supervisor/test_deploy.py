@@ -85,8 +85,8 @@ def alarm_times(story: Story) -> list[float]:
     ],
 )
 def test_the_deploy_follows_the_kill_at_its_confirmation_or_after_the_delay_and_says_which(
-    outcome: Outcome | None, t: float, why: str
-) -> None:
+    outcome, t, why
+):
     story = ordered()
     if outcome is not None:
         story.at(1.25, story.report(K, outcome))
@@ -101,7 +101,7 @@ def test_the_deploy_follows_the_kill_at_its_confirmation_or_after_the_delay_and_
     ) in story.said().splitlines()
 
 
-def test_a_deploy_after_a_kill_alone_leaves_at_once_when_the_delay_is_over() -> None:
+def test_a_deploy_after_a_kill_alone_leaves_at_once_when_the_delay_is_over():
     story = Story().flying()
     story.at(1.0, i.KillRequest(4, "operator", "stop"))
     story.at(2.0)
@@ -111,7 +111,7 @@ def test_a_deploy_after_a_kill_alone_leaves_at_once_when_the_delay_is_over() -> 
     assert len(story.decisions(K)) == 1
 
 
-def test_a_rule_that_got_too_low_while_the_kill_was_awaited_says_so() -> None:
+def test_a_rule_that_got_too_low_while_the_kill_was_awaited_says_so():
     story = by_rule()
     story.at(1.2, story.told(height=9.0, vertical_speed=-13.0))
     story.at(1.6)
@@ -125,7 +125,7 @@ def test_a_rule_that_got_too_low_while_the_kill_was_awaited_says_so() -> None:
     assert "no kill confirmed" in story.alarms()[-1]
 
 
-def test_a_person_deploys_also_below_the_minimum_height_and_is_tried_again_for() -> None:
+def test_a_person_deploys_also_below_the_minimum_height_and_is_tried_again_for():
     story = Story(with_rules(profile=MINIMUM)).flying().fly(0.95, height=11.0)
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     story.at(1.2, story.told(height=9.0, vertical_speed=-13.0))
@@ -139,7 +139,7 @@ def test_a_person_deploys_also_below_the_minimum_height_and_is_tried_again_for()
 # -- sent until it is reported -------------------------------------------------------------------
 
 
-def test_a_decision_is_sent_again_until_a_node_reports_and_with_the_same_number() -> None:
+def test_a_decision_is_sent_again_until_a_node_reports_and_with_the_same_number():
     story = Story().deploying()
     story.at(1.45)
     again = [o for _, o in story.outputs if isinstance(o, i.Decide) and o.again]
@@ -153,7 +153,7 @@ def test_a_decision_is_sent_again_until_a_node_reports_and_with_the_same_number(
 
 
 @pytest.mark.parametrize("delay", [0.42, 0.5, 0.53, 0.57])
-def test_a_kill_that_is_not_reported_is_said_again_before_each_deploy(delay: float) -> None:
+def test_a_kill_that_is_not_reported_is_said_again_before_each_deploy(delay):
     """The node is dead, and may be started again between any two of them."""
     story = Story(SupervisorConfig(kill_to_deploy_delay=delay)).ordered()
     story.at(2.4)
@@ -170,9 +170,7 @@ def test_a_kill_that_is_not_reported_is_said_again_before_each_deploy(delay: flo
     ("outcome", "t", "deploys"),
     [(Outcome.SENT, 1.3, 2), (Outcome.FAILED, 60.0, 1), (Outcome.CONFIRMED, 1.3, 1)],
 )
-def test_a_node_that_restarts_hears_of_what_still_goes_on_under_a_new_number(
-    outcome: Outcome, t: float, deploys: int
-) -> None:
+def test_a_node_that_restarts_hears_of_what_still_goes_on_under_a_new_number(outcome, t, deploys):
     story = Story().deploying()
     story.at(1.2, story.report(D, outcome))
     story.seq = -1
@@ -180,7 +178,7 @@ def test_a_node_that_restarts_hears_of_what_still_goes_on_under_a_new_number(
     assert (len(story.decisions(D)), len(story.decisions(K))) == (deploys, 1)
 
 
-def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said() -> None:
+def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said():
     story = Story(SupervisorConfig(kill_links=BOTH, deploy_links=BOTH)).ordered()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     first = story.newest(K)
@@ -203,7 +201,7 @@ def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said() -
 # -- what confirms it ----------------------------------------------------------------------------
 
 
-def test_success_is_the_devices_own_confirmation_and_flight_is_blocked_until_a_reset() -> None:
+def test_success_is_the_devices_own_confirmation_and_flight_is_blocked_until_a_reset():
     story = Story().deploying()
     story.at(1.2, story.report(D, Outcome.SENT))
     story.at(1.3, story.report(D, Outcome.ACCEPTED))
@@ -221,7 +219,7 @@ def test_success_is_the_devices_own_confirmation_and_flight_is_blocked_until_a_r
     assert story.state.stage is Stage.DEPLOYED, "a later failure undoes nothing"
 
 
-def test_a_status_that_says_released_is_believed_and_the_report_awaited_for_the_answer() -> None:
+def test_a_status_that_says_released_is_believed_and_the_report_awaited_for_the_answer():
     story = Story().deploying()
     story.at(1.2, parachute(deployed=True), parachute(device="1/162"))
     assert story.state.stage is Stage.DEPLOYED, "the second does not hide the first"
@@ -236,7 +234,7 @@ def test_a_status_that_says_released_is_believed_and_the_report_awaited_for_the_
     assert story.answer(5) == i.Finish(5, True, False, "its own status says deployed")
 
 
-def test_one_failed_parachute_of_two_is_no_failure_while_the_other_may_come() -> None:
+def test_one_failed_parachute_of_two_is_no_failure_while_the_other_may_come():
     story = deploying(deploy_links=BOTH)
     story.at(1.2, failed(story))
     assert story.state.stage is Stage.DEPLOYING
@@ -244,7 +242,7 @@ def test_one_failed_parachute_of_two_is_no_failure_while_the_other_may_come() ->
     assert story.state.stage is Stage.DEPLOYED
 
 
-def test_a_second_caller_joins_and_both_are_answered_and_it_fires_once() -> None:
+def test_a_second_caller_joins_and_both_are_answered_and_it_fires_once():
     story = Story().deploying()
     story.at(1.2, i.DeployRequest(6, False, "me too"))
     story.at(1.3, story.report(D, Outcome.CONFIRMED))
@@ -264,9 +262,7 @@ def test_a_second_caller_joins_and_both_are_answered_and_it_fires_once() -> None
         (7, None, "stranger"),
     ],
 )
-def test_a_confirmation_of_another_number_or_link_confirms_nothing(
-    epoch: int, number: int | None, link: str
-) -> None:
+def test_a_confirmation_of_another_number_or_link_confirms_nothing(epoch, number, link):
     story = climbing()
     assert story.newest(K).id == 2
     told = story.newest(D).id if number is None else number
@@ -274,7 +270,7 @@ def test_a_confirmation_of_another_number_or_link_confirms_nothing(
     assert story.state.stage is Stage.DEPLOYING
 
 
-def test_a_kill_that_is_confirmed_late_is_no_confirmation_of_the_deploy() -> None:
+def test_a_kill_that_is_confirmed_late_is_no_confirmation_of_the_deploy():
     story = Story().ordered()
     story.at(1.6)
     assert story.state.stage is Stage.DEPLOYING
@@ -282,7 +278,7 @@ def test_a_kill_that_is_confirmed_late_is_no_confirmation_of_the_deploy() -> Non
     assert story.state.stage is Stage.DEPLOYING
 
 
-def test_a_parachute_that_is_out_before_any_step_was_taken_is_the_answer() -> None:
+def test_a_parachute_that_is_out_before_any_step_was_taken_is_the_answer():
     story = ordered()
     story.at(1.1, parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
@@ -290,7 +286,7 @@ def test_a_parachute_that_is_out_before_any_step_was_taken_is_the_answer() -> No
     assert story.answer(5) == i.Finish(5, True, False, text)
 
 
-def test_a_parachute_that_opens_by_itself_in_flight_stops_the_motors_and_all_are_named() -> None:
+def test_a_parachute_that_opens_by_itself_in_flight_stops_the_motors_and_all_are_named():
     story = Story(SupervisorConfig(deploy_links=BOTH)).flying()
     story.at(0.1, story.heartbeat(UPF), parachute(UPF, "33", True), parachute(deployed=True))
     assert story.newest(K).rule == "parachute open"
@@ -301,7 +297,7 @@ def test_a_parachute_that_opens_by_itself_in_flight_stops_the_motors_and_all_are
     ) in story.said().splitlines()
 
 
-def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named() -> None:
+def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named():
     story = Story().ready()
     story.at(0.1, parachute(deployed=True), story.heartbeat(healthy=False))
     assert story.state.stage is Stage.BLOCKED
@@ -311,8 +307,8 @@ def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named() -> None
 
 @pytest.mark.parametrize("alive", [True, False])
 def test_what_was_said_before_a_parachute_or_its_node_fell_silent_is_not_believed(
-    alive: bool,
-) -> None:
+    alive,
+):
     story = Story().ready()
     story.at(0.1, parachute(deployed=True), parachute(deployed=True, alive=alive))
     story.at(10.0, i.DeployRequest(5, True, "once more"))
@@ -324,7 +320,7 @@ def test_what_was_said_before_a_parachute_or_its_node_fell_silent_is_not_believe
 # -- the steps of the ladder ---------------------------------------------------------------------
 
 
-def test_the_whole_ladder_is_climbed_step_by_step_to_the_triggers_themselves() -> None:
+def test_the_whole_ladder_is_climbed_step_by_step_to_the_triggers_themselves():
     story = climbing()
     story.alive(2.9, *BOTH)
     assert steps(story) == ALL[:1]
@@ -337,7 +333,7 @@ def test_the_whole_ladder_is_climbed_step_by_step_to_the_triggers_themselves() -
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
-def test_an_ack_is_no_confirmation(outcome: Outcome) -> None:
+def test_an_ack_is_no_confirmation(outcome):
     story = climbing()
     for n in range(19):
         story.at(1.05 + n * 0.1, story.heartbeat(), story.report(D, outcome))
@@ -348,7 +344,7 @@ def test_an_ack_is_no_confirmation(outcome: Outcome) -> None:
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_the_step_that_is_confirmed_is_the_last(number: int) -> None:
+def test_the_step_that_is_confirmed_is_the_last(number):
     story = climbing()
     for _ in range(number):
         story.at(story.t + 0.1, story.report(D, Outcome.FAILED, steps(story)[-1][0]))
@@ -360,7 +356,7 @@ def test_the_step_that_is_confirmed_is_the_last(number: int) -> None:
     assert "still no parachute confirmed" not in story.said()
 
 
-def test_an_earlier_step_that_confirms_late_or_any_parachutes_status_ends_the_climb() -> None:
+def test_an_earlier_step_that_confirms_late_or_any_parachutes_status_ends_the_climb():
     for late in (True, False):
         story = climbing()
         first = story.newest(D)
@@ -372,7 +368,7 @@ def test_an_earlier_step_that_confirms_late_or_any_parachutes_status_ends_the_cl
         assert steps(story) == ALL[:2]
 
 
-def test_the_last_step_goes_on_though_its_device_refuses_for_now() -> None:
+def test_the_last_step_goes_on_though_its_device_refuses_for_now():
     story = climbing(Rung(LINK))
     story.at(1.1, story.report(D, Outcome.REFUSED, detail="temporarily rejected"))
     (deploy,) = story.state.deploying.deploys
@@ -385,7 +381,7 @@ def test_the_last_step_goes_on_though_its_device_refuses_for_now() -> None:
     assert story.answer(5).success
 
 
-def test_a_ladder_of_silent_nodes_is_sent_at_once_and_the_last_step_awaited() -> None:
+def test_a_ladder_of_silent_nodes_is_sent_at_once_and_the_last_step_awaited():
     story = Story(SupervisorConfig(deploy_links=BOTH, deploy_ladder=LADDER)).flying()
     story.at(30.0, i.DeployRequest(5, False, "it falls"))
     story.at(30.5)
@@ -396,7 +392,7 @@ def test_a_ladder_of_silent_nodes_is_sent_at_once_and_the_last_step_awaited() ->
     assert story.state.stage is Stage.FAULT
 
 
-def test_each_step_says_why_it_was_taken() -> None:
+def test_each_step_says_why_it_was_taken():
     story = deploying(deploy_links=BOTH)
     story.alive(3.05, *BOTH)
     assert story.newest(D).rule == "operator"
@@ -424,7 +420,7 @@ def test_each_step_says_why_it_was_taken() -> None:
     )
 
 
-def test_a_step_whose_device_refuses_for_now_is_followed_at_once_and_may_still_confirm() -> None:
+def test_a_step_whose_device_refuses_for_now_is_followed_at_once_and_may_still_confirm():
     story = climbing()
     first = story.newest(D)
     story.at(1.1, story.report(D, Outcome.SENT))
@@ -440,7 +436,7 @@ def test_a_step_whose_device_refuses_for_now_is_followed_at_once_and_may_still_c
     assert steps(story) == ALL[:2]
 
 
-def test_each_link_may_be_silent_for_its_own_time_and_its_step_ends_all_the_same() -> None:
+def test_each_link_may_be_silent_for_its_own_time_and_its_step_ends_all_the_same():
     patient = MappingProxyType({LINK: LinkLimits(lost_after=2.0)})
     story = deploying(deploy_links=BOTH, link_limits=patient)
     story.at(1.0, story.heartbeat())
@@ -455,7 +451,7 @@ def test_each_link_may_be_silent_for_its_own_time_and_its_step_ends_all_the_same
 # -- its end without a parachute -----------------------------------------------------------------
 
 
-def test_the_end_of_the_ladder_says_how_long_it_took() -> None:
+def test_the_end_of_the_ladder_says_how_long_it_took():
     story = deploying(deploy_links=BOTH)
     story.at(1.25, story.heartbeat(), story.heartbeat(UPF), failed(story))
     story.at(1.5, failed(story, UPF))
@@ -466,7 +462,7 @@ def test_the_end_of_the_ladder_says_how_long_it_took() -> None:
     assert story.alarms() == ["no parachute confirmed within 0.5 s: upf_can: denied"]
 
 
-def test_the_answer_after_the_end_says_what_was_reported() -> None:
+def test_the_answer_after_the_end_says_what_was_reported():
     story = deploying()
     story.at(1.1, story.report(D, Outcome.ACCEPTED, detail="acknowledged"), failed(story))
     assert story.answer(5) == i.Finish(
@@ -476,7 +472,7 @@ def test_the_answer_after_the_end_says_what_was_reported() -> None:
 
 
 @pytest.mark.parametrize("limit", [8.0, 4.0])
-def test_without_a_report_the_last_step_ends_after_its_own_limit_and_says_so(limit: float) -> None:
+def test_without_a_report_the_last_step_ends_after_its_own_limit_and_says_so(limit):
     story = deploying(deploy_timeout=limit)
     story.alive(0.95 + limit)
     assert story.state.stage is Stage.DEPLOYING
@@ -487,7 +483,7 @@ def test_without_a_report_the_last_step_ends_after_its_own_limit_and_says_so(lim
     assert story.alarms()[-1] == text
 
 
-def test_its_end_is_an_alarm_that_does_not_stop() -> None:
+def test_its_end_is_an_alarm_that_does_not_stop():
     story = at_its_end(alarm_interval=4.0)
     first = "no parachute confirmed within 0.1 s: mavlink_parachute: denied"
     story.at(1.2, i.VehicleReport(STANDING))
@@ -503,7 +499,7 @@ def test_its_end_is_an_alarm_that_does_not_stop() -> None:
     assert gaps == pytest.approx([2.0] * 30)
 
 
-def test_the_alarm_goes_on_while_somebody_kills_and_stops_when_a_parachute_is_out() -> None:
+def test_the_alarm_goes_on_while_somebody_kills_and_stops_when_a_parachute_is_out():
     story = at_its_end()
     story.at(1.5, i.KillRequest(9, "operator", "stop"))
     story.at(20.0)
@@ -515,7 +511,7 @@ def test_the_alarm_goes_on_while_somebody_kills_and_stops_when_a_parachute_is_ou
     assert len(alarm_times(story)) == 10
 
 
-def test_the_alarm_stops_at_a_reset_on_the_ground() -> None:
+def test_the_alarm_stops_at_a_reset_on_the_ground():
     story = at_its_end()
     story.at(1.2, story.told(**DOWN))
     story.at(1.3, i.ResetRequest(6))
@@ -526,8 +522,8 @@ def test_the_alarm_stops_at_a_reset_on_the_ground() -> None:
 
 @pytest.mark.parametrize("kills", [False, True])
 def test_a_confirmation_that_comes_after_the_end_counts_and_nothing_fires_again(
-    kills: bool,
-) -> None:
+    kills,
+):
     story = at_its_end()
     if kills:
         story.at(1.2, i.KillRequest(6, "operator", "stop"))
@@ -544,7 +540,7 @@ def test_a_confirmation_that_comes_after_the_end_counts_and_nothing_fires_again(
 # -- once more -----------------------------------------------------------------------------------
 
 
-def test_after_a_fault_a_person_may_try_again_from_the_first_step() -> None:
+def test_after_a_fault_a_person_may_try_again_from_the_first_step():
     for confirms in (parachute(deployed=True), None):
         story = at_its_end()
         story.at(2.0, i.DeployRequest(6, False, "again"))
@@ -555,14 +551,14 @@ def test_after_a_fault_a_person_may_try_again_from_the_first_step() -> None:
         assert story.answer(6).success
 
 
-def test_a_confirmation_that_comes_with_another_request_is_its_answer() -> None:
+def test_a_confirmation_that_comes_with_another_request_is_its_answer():
     story = at_its_end()
     story.at(1.3, story.report(D, Outcome.CONFIRMED), i.DeployRequest(6, False, "again"))
     assert story.answer(6).success
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_an_acknowledgement_of_the_last_deploy_is_not_that_of_the_next() -> None:
+def test_an_acknowledgement_of_the_last_deploy_is_not_that_of_the_next():
     story = deploying()
     story.at(1.1, story.report(D, Outcome.ACCEPTED))
     story.at(1.2, story.report(D, Outcome.FAILED))
@@ -572,7 +568,7 @@ def test_an_acknowledgement_of_the_last_deploy_is_not_that_of_the_next() -> None
     assert story.answers(6) == []
 
 
-def test_a_person_who_insists_after_a_confirmation_gets_the_next_parachute_alone() -> None:
+def test_a_person_who_insists_after_a_confirmation_gets_the_next_parachute_alone():
     story = deploying(deploy_links=BOTH)
     story.at(1.1, story.report(D, Outcome.CONFIRMED))
     assert story.state.stage is Stage.DEPLOYED
@@ -585,7 +581,7 @@ def test_a_person_who_insists_after_a_confirmation_gets_the_next_parachute_alone
     assert story.answer(6).success
 
 
-def test_it_is_tried_again_with_the_first_rule_and_says_why() -> None:
+def test_it_is_tried_again_with_the_first_rule_and_says_why():
     story = at_its_end()
     for tick in range(85):
         story.at(1.2 + tick * 0.1, story.heartbeat(), i.VehicleReport(FLYING))
@@ -600,7 +596,7 @@ def test_it_is_tried_again_with_the_first_rule_and_says_why() -> None:
     ), "a link that comes back is told at once"
 
 
-def test_one_that_came_back_with_the_end_of_the_ladder_is_no_reason_to_try_again() -> None:
+def test_one_that_came_back_with_the_end_of_the_ladder_is_no_reason_to_try_again():
     story = deploying()
     story.at(1.1, story.report(D, Outcome.SENT))
     story.at(2.5, story.heartbeat(), failed(story))
@@ -610,7 +606,7 @@ def test_one_that_came_back_with_the_end_of_the_ladder_is_no_reason_to_try_again
 
 
 @pytest.mark.parametrize(("height", "fired"), [(9.0, 1), (11.0, 2)])
-def test_a_rule_tries_again_only_above_the_minimum_height(height: float, fired: int) -> None:
+def test_a_rule_tries_again_only_above_the_minimum_height(height, fired):
     story = by_rule()
     story.at(1.1, story.heartbeat(), story.report(K, Outcome.CONFIRMED))
     story.at(1.2, story.heartbeat(), failed(story))

@@ -32,7 +32,7 @@ def refusals(story: Story) -> list[str]:
 # What it blocks
 
 
-def test_a_device_blocks_flight_and_lets_it_go_again() -> None:
+def test_a_device_blocks_flight_and_lets_it_go_again():
     story = Story().ready()
     story.at(0.1, ask())
     assert story.state.stage is Stage.BLOCKED
@@ -45,7 +45,7 @@ def test_a_device_blocks_flight_and_lets_it_go_again() -> None:
     assert dict(story.state.device_blocks) == {}
 
 
-def test_arming_is_refused_with_the_devices_reason() -> None:
+def test_arming_is_refused_with_the_devices_reason():
     story = Story().ready()
     story.at(0.1, ask(), i.ArmRequest(1, True, 0))
     assert not story.answer(1).success
@@ -55,7 +55,7 @@ def test_arming_is_refused_with_the_devices_reason() -> None:
     assert [o for _, o in story.outputs if isinstance(o, i.ArmDevices)]
 
 
-def test_an_armed_vehicle_on_the_ground_is_blocked_too_and_in_shadow_it_is_only_said() -> None:
+def test_an_armed_vehicle_on_the_ground_is_blocked_too_and_in_shadow_it_is_only_said():
     for mode in (i.Mode.ACTIVE, i.Mode.SHADOW):
         story = Story(mode=mode).ready()
         story.at(0.1, i.ArmDone(0, True, True, ""))
@@ -65,14 +65,14 @@ def test_an_armed_vehicle_on_the_ground_is_blocked_too_and_in_shadow_it_is_only_
         assert (block.action, block.shadow) == (BLOCK, mode is i.Mode.SHADOW)
 
 
-def test_a_device_that_asks_while_it_is_being_armed_is_not_outrun_by_the_arming() -> None:
+def test_a_device_that_asks_while_it_is_being_armed_is_not_outrun_by_the_arming():
     story = Story().ready()
     story.at(0.1, i.ArmRequest(1, True, 0))
     story.at(0.2, ask(), i.ArmDone(1, True, True, "armed"))
     assert story.state.stage is Stage.BLOCKED
 
 
-def test_every_device_that_asks_is_named_and_the_last_one_to_let_go_releases() -> None:
+def test_every_device_that_asks_is_named_and_the_last_one_to_let_go_releases():
     story = Story().ready()
     story.at(0.1, ask(), ask("NOT_READY", "34"))
     assert reasons(story) == (WORDS, "upf_can 34 asks to block flight: NOT_READY")
@@ -82,7 +82,7 @@ def test_every_device_that_asks_is_named_and_the_last_one_to_let_go_releases() -
     assert story.state.stage is Stage.READY
 
 
-def test_a_device_that_lets_go_does_not_outvote_an_unhealthy_link() -> None:
+def test_a_device_that_lets_go_does_not_outvote_an_unhealthy_link():
     story = Story().ready()
     story.at(0.1, ask(), story.heartbeat(healthy=False))
     story.at(0.2, let_go())
@@ -98,7 +98,7 @@ def test_a_device_that_lets_go_does_not_outvote_an_unhealthy_link() -> None:
         (ask(device=""), "upf_can asks to block flight: ABNORMAL"),
     ],
 )
-def test_what_a_device_leaves_out_is_said_in_words(one: i.BlockRequest, words: str) -> None:
+def test_what_a_device_leaves_out_is_said_in_words(one, words):
     story = Story().ready()
     story.at(0.1, one)
     assert reasons(story) == story.newest(BLOCK).reasons == (words,)
@@ -107,7 +107,7 @@ def test_what_a_device_leaves_out_is_said_in_words(one: i.BlockRequest, words: s
 # Repeating
 
 
-def test_asking_for_the_same_or_letting_go_of_what_was_never_asked_changes_nothing() -> None:
+def test_asking_for_the_same_or_letting_go_of_what_was_never_asked_changes_nothing():
     for first, again in ((ask(), ask()), (let_go("34"), let_go())):
         story = Story().ready()
         story.at(0.1, first, story.report(RELEASE, Outcome.CONFIRMED))
@@ -117,7 +117,7 @@ def test_asking_for_the_same_or_letting_go_of_what_was_never_asked_changes_nothi
         assert len(story.outputs) == count
 
 
-def test_another_reason_takes_the_place_of_the_first_without_a_new_decision() -> None:
+def test_another_reason_takes_the_place_of_the_first_without_a_new_decision():
     story = Story().ready()
     story.at(0.1, ask())
     story.at(0.2, ask("NOT_READY"))
@@ -128,7 +128,7 @@ def test_another_reason_takes_the_place_of_the_first_without_a_new_decision() ->
 # While starting
 
 
-def test_while_starting_it_blocks_as_an_unhealthy_link_does() -> None:
+def test_while_starting_it_blocks_as_an_unhealthy_link_does():
     story = Story()
     story.at(0.0, ask(), story.heartbeat(), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.STARTUP
@@ -146,7 +146,7 @@ def test_while_starting_it_blocks_as_an_unhealthy_link_does() -> None:
 # In the air
 
 
-def test_in_the_air_nothing_is_undone_and_it_counts_once_on_the_ground() -> None:
+def test_in_the_air_nothing_is_undone_and_it_counts_once_on_the_ground():
     story = Story().flying()
     count = len(story.decisions())
     story.at(0.1, ask())
@@ -167,7 +167,7 @@ def test_in_the_air_nothing_is_undone_and_it_counts_once_on_the_ground() -> None
     assert story.state.stage is Stage.READY
 
 
-def test_taking_off_although_a_device_asks_is_an_alarm_and_followed_as_a_flight() -> None:
+def test_taking_off_although_a_device_asks_is_an_alarm_and_followed_as_a_flight():
     story = Story().ready()
     story.at(0.1, ask())
     story.at(0.2, i.VehicleReport(FLYING))
@@ -177,7 +177,7 @@ def test_taking_off_although_a_device_asks_is_an_alarm_and_followed_as_a_flight(
     assert "upf_can 33" in story.state.device_blocks
 
 
-def test_a_kill_and_a_deploy_go_on_whatever_a_device_asks() -> None:
+def test_a_kill_and_a_deploy_go_on_whatever_a_device_asks():
     story = Story().flying()
     story.at(1.0, i.DeployRequest(1, False, "it falls"), ask())
     story.at(1.1, story.report(Action.KILL, Outcome.CONFIRMED), ask("NOT_READY"))
@@ -189,7 +189,7 @@ def test_a_kill_and_a_deploy_go_on_whatever_a_device_asks() -> None:
 # Reset and modes
 
 
-def test_a_reset_forgets_a_unit_that_was_exchanged_and_one_that_still_asks_is_heard() -> None:
+def test_a_reset_forgets_a_unit_that_was_exchanged_and_one_that_still_asks_is_heard():
     story = Story().ready()
     story.at(0.1, ask())
     story.at(0.2, i.ResetRequest(1))
@@ -200,7 +200,7 @@ def test_a_reset_forgets_a_unit_that_was_exchanged_and_one_that_still_asks_is_he
     assert story.state.stage is Stage.BLOCKED
 
 
-def test_inhibited_it_is_remembered_and_blocks_once_active() -> None:
+def test_inhibited_it_is_remembered_and_blocks_once_active():
     story = Story(mode=i.Mode.INHIBITED).ready()
     story.at(0.1, ask())
     assert story.decisions() == []
@@ -219,7 +219,7 @@ def full() -> Story:
     return story
 
 
-def test_made_up_names_are_not_remembered_without_end_which_is_said_once() -> None:
+def test_made_up_names_are_not_remembered_without_end_which_is_said_once():
     story = full()
     for n in range(1000):
         story.at(0.2, ask(device=f"made up {n}"))
@@ -228,7 +228,7 @@ def test_made_up_names_are_not_remembered_without_end_which_is_said_once() -> No
     assert text == "upf_can made up 0 asks to block flight: not remembered, 64 devices do already"
 
 
-def test_those_that_are_remembered_may_still_change_their_reason_and_let_go() -> None:
+def test_those_that_are_remembered_may_still_change_their_reason_and_let_go():
     story = full()
     story.at(0.2, ask(device="one more"))
     story.at(0.3, ask("NOT_READY", "7"))
@@ -241,7 +241,7 @@ def test_those_that_are_remembered_may_still_change_their_reason_and_let_go() ->
     assert len(refusals(story)) == 2
 
 
-def test_after_a_reset_a_new_flood_is_said_again() -> None:
+def test_after_a_reset_a_new_flood_is_said_again():
     story = full()
     story.at(0.2, ask(device="one more"), i.ResetRequest(1))
     story.at(0.3, *[ask(device=str(n)) for n in range(MOST_DEVICE_BLOCKS + 1)])

@@ -1,7 +1,5 @@
 """A sign in doubt counts half where one would decide alone; a doubt belongs to its source."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import MappingProxyType
@@ -27,7 +25,7 @@ def doubt(story: Story, name: str) -> str:
     return readings.doubt(story.state, name, value, START + story.t)
 
 
-def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() -> None:
+def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight():
     """Given a sensor of the second source that turns by 180 degrees at once, flying well."""
     story = flying().fly(1.0, 0.02, **LOST)
     story.fly(4.0, 0.02, **LOST, tilt=179.0)
@@ -35,7 +33,7 @@ def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() ->
     assert story.state.stage is Stage.IN_FLIGHT
 
 
-def test_with_a_second_sign_it_does() -> None:
+def test_with_a_second_sign_it_does():
     story = flying().fly(1.0, 0.02, **LOST)
     story.fly(2.0, 0.02, **LOST, tilt=179.0)
     story.fly(3.0, 0.02, **LOST, tilt=179.0, acceleration=3.0)
@@ -45,7 +43,7 @@ def test_with_a_second_sign_it_does() -> None:
     assert "tilt_deg 179.00 (above 45; in doubt: it jumped" in reasons
 
 
-def test_one_that_tips_over_as_bodies_do_is_not_in_doubt() -> None:
+def test_one_that_tips_over_as_bodies_do_is_not_in_doubt():
     """Given the attitude alone, as of an IMU: at 400 degrees a second it turns over."""
     story = flying().fly(1.0, 0.02, **LOST)
     for step in range(1, 60):
@@ -54,9 +52,7 @@ def test_one_that_tips_over_as_bodies_do_is_not_in_doubt() -> None:
     assert story.fired()[0] == "KILL"
 
 
-def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last_and_one_not_taken_a_second() -> (
-    None
-):
+def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last_and_one_not_taken_a_second():
     story = flying().fly(1.0, 0.02)
     story.fly(1.02, 0.02, tilt=179.0)
     assert story.state.measured("tilt_deg").rejected
@@ -75,9 +71,7 @@ def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last_and_one_not_taken
 
 
 @pytest.mark.parametrize(("force", "fires"), [(0.0, False), (0.01, True)])
-def test_a_force_of_exactly_nothing_is_what_a_broken_sensor_says(
-    force: float, fires: bool
-) -> None:
+def test_a_force_of_exactly_nothing_is_what_a_broken_sensor_says(force, fires):
     story = flying()
     for _ in range(20):
         told = story.told(**LOST)
@@ -86,7 +80,7 @@ def test_a_force_of_exactly_nothing_is_what_a_broken_sensor_says(
     assert bool(story.fired()) is fires
 
 
-def test_one_that_is_upside_down_is_no_impossible_one() -> None:
+def test_one_that_is_upside_down_is_no_impossible_one():
     """Pi as a message carries it is a little more than pi."""
     story = flying()
     told = story.told()
@@ -94,7 +88,7 @@ def test_one_that_is_upside_down_is_no_impossible_one() -> None:
     assert story.state.measured("tilt_deg").rejected == ""
 
 
-def test_what_another_source_contradicts_is_doubted() -> None:
+def test_what_another_source_contradicts_is_doubted():
     story = flying()
     told = story.told(tilt=90.0, **LOST)
     for _ in range(20):
@@ -111,7 +105,7 @@ def test_what_another_source_contradicts_is_doubted() -> None:
 
 
 @pytest.mark.parametrize(("sinks", "fires"), [(0.0, False), (8.0, True)])
-def test_a_speed_that_the_heights_deny_is_no_sink(sinks: float, fires: bool) -> None:
+def test_a_speed_that_the_heights_deny_is_no_sink(sinks, fires):
     """Given a vertical speed that drifts, beside heights that stay where they are."""
     story = flying().fly(1.0, **LOST).fly(1.05, **LOST, vertical_speed=-4.0)
     for step in range(60):
@@ -122,9 +116,7 @@ def test_a_speed_that_the_heights_deny_is_no_sink(sinks: float, fires: bool) -> 
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 @pytest.mark.parametrize(("sinks", "fires"), [(0.0, False), (12.0, True)])
-def test_beside_a_speed_that_jumped_a_gust_that_lifts_is_no_sign(
-    profile: str, sinks: float, fires: bool
-) -> None:
+def test_beside_a_speed_that_jumped_a_gust_that_lifts_is_no_sign(profile, sinks, fires):
     """Given a speed that is suddenly 16 m/s too low, and a force of less than half its weight."""
     story = flying(profile)
     begun = story.t
@@ -138,7 +130,7 @@ def test_beside_a_speed_that_jumped_a_gust_that_lifts_is_no_sign(
         assert story.when(Action.KILL) - begun < 2.5
 
 
-def test_a_fall_whose_speed_was_not_told_for_a_second_is_no_jump() -> None:
+def test_a_fall_whose_speed_was_not_told_for_a_second_is_no_jump():
     story = flying().fly(1.0)
     begun = story.t
     story.fly(begun + 1.0, vertical_speed=math.nan, height=math.nan, acceleration=4.5)
@@ -151,7 +143,7 @@ def test_a_fall_whose_speed_was_not_told_for_a_second_is_no_jump() -> None:
 
 
 @pytest.mark.parametrize(("before", "delay"), [(0.0, 1.0), (0.5, 0.5), (2.0, 0.05)])
-def test_signs_are_counted_while_the_silence_is_waited_for(before: float, delay: float) -> None:
+def test_signs_are_counted_while_the_silence_is_waited_for(before, delay):
     """Given an aeroplane on its side for so long before its autopilot counts as lost."""
     story = flying("fixed_wing")
     story.fly(story.t + before, tilt=80.0 if before else 0.0)
@@ -162,7 +154,7 @@ def test_signs_are_counted_while_the_silence_is_waited_for(before: float, delay:
 
 
 @pytest.mark.parametrize(("lasts", "fires"), [(0.7, False), (1.0, True)])
-def test_a_gust_that_lifts_beside_a_hung_autopilot_is_no_fall(lasts: float, fires: bool) -> None:
+def test_a_gust_that_lifts_beside_a_hung_autopilot_is_no_fall(lasts, fires):
     """Given an IMU alone, and a multirotor of which less than half of the weight is carried."""
     unknown = {"vertical_speed": math.nan, "height": math.nan}
     story = flying().fly(4.0, 0.02, **LOST, **unknown)
@@ -171,13 +163,13 @@ def test_a_gust_that_lifts_beside_a_hung_autopilot_is_no_fall(lasts: float, fire
     assert bool(story.fired()) is fires
 
 
-def test_what_was_counted_leaks_before_the_silence_as_well() -> None:
+def test_what_was_counted_leaks_before_the_silence_as_well():
     story = flying("fixed_wing").fly(1.0, tilt=80.0)
     story.fly(3.0).fly(3.5, tilt=80.0, **LOST)
     assert story.fired() == []
 
 
-def test_a_force_that_is_noise_does_not_keep_what_it_counted() -> None:
+def test_a_force_that_is_noise_does_not_keep_what_it_counted():
     """Given an IMU alone, that tells no speed: its noise is below the limit now and then."""
     story = flying().fly(4.5, 0.02, vertical_speed=math.nan, height=math.nan)
     forces = (9.0, 3.5, 12.0, 3.0, 20.0, 9.8, 3.9, 3.1, 15.0, 7.0)
@@ -187,7 +179,7 @@ def test_a_force_that_is_noise_does_not_keep_what_it_counted() -> None:
     assert story.fired() == []
 
 
-def test_an_accelerometer_that_tells_random_bits_ends_no_flight() -> None:
+def test_an_accelerometer_that_tells_random_bits_ends_no_flight():
     """Given an IMU alone: of its numbers most are out of range, and the others are nearly 0."""
     unknown = {"vertical_speed": math.nan, "height": math.nan}
     for forces in ((1e30, 0.0), (1e30, 1e30, 1e30, 1e-9, 1e-5), (1e30, 1e-3, 1e-4, 1e-6)):
@@ -198,7 +190,7 @@ def test_an_accelerometer_that_tells_random_bits_ends_no_flight() -> None:
         assert story.fired() == []
 
 
-def test_a_date_that_goes_back_puts_no_value_in_doubt() -> None:
+def test_a_date_that_goes_back_puts_no_value_in_doubt():
     """Given two sources of one truth, of which one is told later: its dates go back and forth."""
     story = flying().fly(1.0)
     for _ in range(10):
@@ -209,7 +201,7 @@ def test_a_date_that_goes_back_puts_no_value_in_doubt() -> None:
     assert math.isnan(story.state.measured("tilt_deg").jumped_at)
 
 
-def test_who_was_late_has_counted_nothing_while_the_silence_was_its_own() -> None:
+def test_who_was_late_has_counted_nothing_while_the_silence_was_its_own():
     """Given a banked vehicle whose supervisor hangs: its first word afterwards is that the
     autopilot is lost, as nobody has read it."""
     story = flying("fixed_wing").fly(3.0, tilt=80.0)
@@ -220,7 +212,7 @@ def test_who_was_late_has_counted_nothing_while_the_silence_was_its_own() -> Non
     assert story.fired() == []
 
 
-def test_a_supervisor_that_stalls_shortly_goes_on_counting() -> None:
+def test_a_supervisor_that_stalls_shortly_goes_on_counting():
     """Given one that stalls again and again as its aeroplane falls."""
     story = flying("fixed_wing").fly(1.0, tilt=80.0, **LOST)
     for _ in range(2):
@@ -256,7 +248,7 @@ def told_by_another(*samples: tuple[float, float]) -> Measured:
 # -- doubt belongs to a source --------------------------------------------------------------------
 
 
-def test_what_one_source_put_in_doubt_says_nothing_of_another_and_counts_when_it_is_back() -> None:
+def test_what_one_source_put_in_doubt_says_nothing_of_another_and_counts_when_it_is_back():
     assert JUMPED.has_jumped(0.3)
     assert JUMPED.told_by("") is JUMPED
     other = JUMPED.told_by("imu")
@@ -286,8 +278,8 @@ def test_what_one_source_put_in_doubt_says_nothing_of_another_and_counts_when_it
     ],
 )
 def test_another_source_has_jumped_from_what_was_told_last_but_not_back(
-    samples: list[tuple[float, float]], jumped_at: float, before_jump: float
-) -> None:
+    samples, jumped_at, before_jump
+):
     known = told_by_another(*samples)
     assert known.value == samples[-1][0]
     told = (known.jumped_at, known.before_jump)
@@ -295,7 +287,7 @@ def test_another_source_has_jumped_from_what_was_told_last_but_not_back(
     assert known.has_jumped(samples[-1][1]) is not math.isnan(jumped_at)
 
 
-def test_a_jump_from_one_source_to_the_other_is_the_others() -> None:
+def test_a_jump_from_one_source_to_the_other_is_the_others():
     other = heights((100.0, 0.0)).told_by("imu")
     for at in (0.1, 0.15, 0.2):
         other = other.with_sample(Sample(60.0 - at, at), HEIGHT)
@@ -312,7 +304,7 @@ def test_a_jump_from_one_source_to_the_other_is_the_others() -> None:
         ("height", "height"),
     ],
 )
-def test_a_report_names_who_tells_a_part(part: str, name: str) -> None:
+def test_a_report_names_who_tells_a_part(part, name):
     story = Story(shipped("multirotor")).ready().fly(0.3)
     assert story.state.measured(name).source == ""
     told = replace(story.told(), told_by=MappingProxyType({part: "imu"}))
@@ -355,8 +347,8 @@ LIES = [
 
 @pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
 def test_by_a_speed_that_lies_downwards_one_that_flies_well_is_not_ended(
-    profile: str, speed: float, every: float, gap: float
-) -> None:
+    profile, speed, every, gap
+):
     """Its heights alone deny the sink: were they not believed, nothing would."""
     story = told_beside_a_lie(profile, -speed, every, gap)
     assert story.state.measured("vertical_speed").value == pytest.approx(-speed, abs=0.1)
@@ -365,9 +357,7 @@ def test_by_a_speed_that_lies_downwards_one_that_flies_well_is_not_ended(
 
 
 @pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
-def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(
-    profile: str, speed: float, every: float, gap: float
-) -> None:
+def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(profile, speed, every, gap):
     story = told_beside_a_lie(profile, speed, every, gap, falls=True)
     assert story.fired()[:1] == ["KILL"]
     assert story.newest(Action.KILL).rule == "excess tilt"
@@ -376,7 +366,7 @@ def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(
 # -- who tells nothing ----------------------------------------------------------------------------
 
 
-def test_a_doubt_stands_while_nobody_tells_the_part() -> None:
+def test_a_doubt_stands_while_nobody_tells_the_part():
     """Given an IMU whose tilt has jumped, of which three of four words cannot be read: the part is
     told by nobody then, and its last value is still young."""
     story = Story(shipped("multirotor")).ready().fly(1.0)

@@ -28,7 +28,7 @@ def aloft(name: str = "multirotor", **settings: Any) -> Story:
 @pytest.mark.parametrize("pressed", [True, False])
 @pytest.mark.parametrize("power", [1, 2])
 @pytest.mark.parametrize("last", [9.7, 11.0, 12.0, 13.0, 14.0])
-def test_what_falls_flat_is_deployed(last: float, power: int, pressed: bool) -> None:
+def test_what_falls_flat_is_deployed(last, power, pressed):
     """Given motors that stop, and drag that carries it ever more, with its speed (PX4's simulator,
     9.7 m/s in the end) or the square of it. Nobody tells what was commanded."""
     story, height, speed = aloft(), 80.0, 0.0
@@ -45,7 +45,7 @@ def test_what_falls_flat_is_deployed(last: float, power: int, pressed: bool) -> 
 
 
 @pytest.mark.parametrize("begins", [0.0, 0.4, 0.8])
-def test_a_silence_of_its_telemetry_hides_no_fall(begins: float) -> None:
+def test_a_silence_of_its_telemetry_hides_no_fall(begins):
     """The same fall, of which 0.6 s are not told."""
     story, height, speed, since = aloft(), 80.0, 0.0, 0.0
     while "DEPLOY" not in story.fired() and height > 20.0:
@@ -64,9 +64,7 @@ def test_a_silence_of_its_telemetry_hides_no_fall(begins: float) -> None:
 
 @pytest.mark.parametrize("says", [{"battery_remaining": 0.0}, {"system_status": 6}])
 @pytest.mark.parametrize("sinks", [6.5, 7.3])
-def test_who_comes_down_fast_with_an_empty_battery_is_not_ended(
-    says: dict[str, float], sinks: float
-) -> None:
+def test_who_comes_down_fast_with_an_empty_battery_is_not_ended(says, sinks):
     """By hand, which tells no target; MAV_STATE_EMERGENCY is said by what still flies."""
     story, height = aloft(), 90.0
     while height > 15.0:
@@ -78,9 +76,7 @@ def test_who_comes_down_fast_with_an_empty_battery_is_not_ended(
 
 @pytest.mark.parametrize("sinks", [6.5, 7.3])
 @pytest.mark.parametrize("chopped", [0.45, 0.7, 0.9])
-def test_a_pilot_who_chops_the_throttle_and_sinks_on_is_not_ended(
-    chopped: float, sinks: float
-) -> None:
+def test_a_pilot_who_chops_the_throttle_and_sinks_on_is_not_ended(chopped, sinks):
     """As in STABILIZE and ACRO, which tell no target: 0.8 s later it sinks steadily."""
     story, height, speed, since = aloft(), 120.0, 0.0, 0.0
     while height > 30.0:
@@ -94,7 +90,7 @@ def test_a_pilot_who_chops_the_throttle_and_sinks_on_is_not_ended(
 
 
 @pytest.mark.parametrize("dropped", [0.5, 0.7, 0.9])
-def test_what_is_dropped_and_caught_flies_on(dropped: float) -> None:
+def test_what_is_dropped_and_caught_flies_on(dropped):
     """As it is thrown, or launched from another: 1.5 g catch it."""
     story, height, speed = aloft(), 80.0, 0.0
     begun = story.t
@@ -121,7 +117,7 @@ def boosted(seconds: float) -> Iterator[tuple[float, float, float]]:
         yield height, speed, abs(thrust - drag)
 
 
-def test_a_rocket_whose_launch_nobody_recognised_and_that_tells_no_speed_is_seen_to_fall() -> None:
+def test_a_rocket_whose_launch_nobody_recognised_and_that_tells_no_speed_is_seen_to_fall():
     """Given a flight computer that stays in Standby, and a receiver that loses the satellites in
     the boost: the force of the motor is no sensor that is wrong on the ground."""
     story = Story(shipped("rocket")).ready()
@@ -172,9 +168,7 @@ SPEED = {"vertical_speed": -14.0, "height": math.nan}
         ([(3.0, RESTS), (16.0, {**ANEW, **DOWN, "tilt": 90.0})], []),
     ],
 )
-def test_what_is_told_after_a_second_of_flight(
-    told: list[tuple[float, dict[str, Any]]], fired: list[str]
-) -> None:
+def test_what_is_told_after_a_second_of_flight(told, fired):
     story = aloft()
     for seconds, parts in told:
         story.fly(story.t + seconds, **parts)
@@ -197,9 +191,7 @@ def released() -> Story:
 
 @EACH
 @pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
-def test_a_barometer_that_drifts_at_start_up_deploys_nothing_on_the_ground(
-    name: str, armed: Armed
-) -> None:
+def test_a_barometer_that_drifts_at_start_up_deploys_nothing_on_the_ground(name, armed):
     story = Story(shipped(name))
     height = 0.0
     for n in range(400):
@@ -214,14 +206,14 @@ def test_a_barometer_that_drifts_at_start_up_deploys_nothing_on_the_ground(
     assert "vertical_speed cannot be used: it reports" in story.said()
 
 
-def test_a_land_detector_that_believes_the_drift_deploys_nothing_while_disarmed() -> None:
+def test_a_land_detector_that_believes_the_drift_deploys_nothing_while_disarmed():
     story = Story(shipped("multirotor"))
     story.fly(20.0, armed=Armed.DISARMED, vertical_speed=-20.0, height=200.0)
     assert story.state.stage is Stage.READY
     assert story.fired() == []
 
 
-def test_a_barometer_that_jumps_in_flight_is_not_a_fall() -> None:
+def test_a_barometer_that_jumps_in_flight_is_not_a_fall():
     story = aloft()
     for n in range(40):
         # A gust on the static port: single samples far off, and back.
@@ -232,7 +224,7 @@ def test_a_barometer_that_jumps_in_flight_is_not_a_fall() -> None:
 # -- deployment missed because a counter was reset -----------------------------------------------
 
 
-def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deployed() -> None:
+def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deployed():
     story = aloft()
     start = story.t
     story.fly(story.t + 0.05, tilt=60.0, vertical_speed=-3.5)  # nothing turns over in one sample
@@ -244,7 +236,7 @@ def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deploye
     assert story.when(K) - start < 1.0
 
 
-def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> None:
+def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well():
     story = aloft().fall(2.0)
     start = story.t
     for n in range(80):
@@ -254,7 +246,7 @@ def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> No
     assert story.when(K) - start < 2.5
 
 
-def test_dropped_messages_do_not_reset_the_count() -> None:
+def test_dropped_messages_do_not_reset_the_count():
     story = aloft()
     start = story.t
     for n in range(40):
@@ -271,14 +263,14 @@ def test_dropped_messages_do_not_reset_the_count() -> None:
 
 @pytest.mark.parametrize("armed", [Armed.ARMED, Armed.DISARMED])
 def test_a_fall_that_the_autopilot_takes_for_a_landing_is_killed_and_deployed(
-    armed: Armed,
-) -> None:
+    armed,
+):
     story = aloft()
     story.fall(3.5, landed_state=GROUND, armed=armed)
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_steady_fall_at_one_g_that_is_taken_for_standing_is_deployed() -> None:
+def test_a_steady_fall_at_one_g_that_is_taken_for_standing_is_deployed():
     story = aloft()
     # It has reached its final speed: the accelerometer feels what it feels on the ground.
     lie = {"landed_state": GROUND, "armed": Armed.DISARMED}
@@ -288,7 +280,7 @@ def test_a_steady_fall_at_one_g_that_is_taken_for_standing_is_deployed() -> None
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_vertical_speed_is_believed_alone_where_no_height_can_be_used() -> None:
+def test_a_vertical_speed_is_believed_alone_where_no_height_can_be_used():
     story = aloft()
     story.sink(story.t + 3.5, 14.0, height=math.nan)
     assert story.fired() == ["KILL", "DEPLOY"]
@@ -303,7 +295,7 @@ LADDER = {
 }
 
 
-def test_a_parachute_that_does_not_come_out_is_followed_by_the_next_down_to_the_triggers() -> None:
+def test_a_parachute_that_does_not_come_out_is_followed_by_the_next_down_to_the_triggers():
     story = aloft(**LADDER)
     for n in range(1, 161):
         beats = [story.heartbeat(), story.heartbeat(UPF)]
@@ -324,7 +316,7 @@ def test_a_parachute_that_does_not_come_out_is_followed_by_the_next_down_to_the_
     assert story.state.stage is Stage.DEPLOYED
 
 
-def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
+def test_when_none_comes_out_the_alarm_does_not_stop():
     story = aloft(**LADDER).fall(2.0, 2000.0)
     story.at(60.0)
     assert story.state.stage is Stage.FAULT
@@ -338,7 +330,7 @@ def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
 # -- a late ACK taken for a confirmation ---------------------------------------------------------
 
 
-def test_an_ack_however_late_is_no_confirmation() -> None:
+def test_an_ack_however_late_is_no_confirmation():
     story = aloft(**LADDER).fall(2.6, 2000.0)
     first = story.newest(D)
     late = i.ActionReport(first.epoch, first.id, LINK, Outcome.ACCEPTED, "ACK", first.epoch)
@@ -349,7 +341,7 @@ def test_an_ack_however_late_is_no_confirmation() -> None:
     assert story.state.stage is Stage.FAULT
 
 
-def test_a_confirmation_of_the_last_flight_is_none_of_this_one() -> None:
+def test_a_confirmation_of_the_last_flight_is_none_of_this_one():
     story = aloft().fall(3.0)
     old = story.newest(D)
     story.at(3.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
@@ -367,7 +359,7 @@ def test_a_confirmation_of_the_last_flight_is_none_of_this_one() -> None:
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_an_autopilot_that_starts_anew_at_height_and_falls_is_deployed(name: str) -> None:
+def test_an_autopilot_that_starts_anew_at_height_and_falls_is_deployed(name):
     story = aloft(name)
     # All that it says of itself is as on the ground: disarmed, landed, at height 0.
     for n in range(1, 50):
@@ -378,13 +370,13 @@ def test_an_autopilot_that_starts_anew_at_height_and_falls_is_deployed(name: str
     assert story.newest(D).rule in rules
 
 
-def test_an_autopilot_that_starts_anew_and_flies_on_is_not_deployed() -> None:
+def test_an_autopilot_that_starts_anew_and_flies_on_is_not_deployed():
     story = aloft().fly(20.0, **ANEW)
     assert story.fired() == []
     assert story.alarms() == ["the autopilot restarted in flight"]
 
 
-def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back() -> None:
+def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back():
     story = aloft().fly(1.5, **ANEW)
     story.sink(4.7, 14.0, **ANEW)
     assert story.fired() == ["KILL", "DEPLOY"]
@@ -395,7 +387,7 @@ def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back() -> None:
 
 @EACH
 @pytest.mark.parametrize("gap", [0.49, 0.51, 0.99, 1.01, 2.0])
-def test_a_link_that_flaps_at_its_limit_fires_nothing(name: str, gap: float) -> None:
+def test_a_link_that_flaps_at_its_limit_fires_nothing(name, gap):
     story = aloft(name)
     for n in range(1, 150):
         beat = [story.heartbeat()] if (n * 0.1) % gap < 0.1 else []
@@ -404,7 +396,7 @@ def test_a_link_that_flaps_at_its_limit_fires_nothing(name: str, gap: float) -> 
     assert story.state.stage is Stage.IN_FLIGHT
 
 
-def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it() -> None:
+def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it():
     story = aloft()
     for n in range(1, 60):
         beat = [story.heartbeat()] if n % 24 == 0 else []  # every 1.2 s: lost each time
@@ -423,7 +415,7 @@ def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it() -
 # -- a restart under the canopy ------------------------------------------------------------------
 
 
-def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_alive() -> None:
+def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_alive():
     """One damaged status says that a parachute is out, and the motors are stopped for it."""
     story = aloft()
     story.at(story.t + 0.05, story.heartbeat(), parachute(deployed=True))
@@ -438,7 +430,7 @@ def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_a
     assert story.state.stage is Stage.DEPLOYED
 
 
-def test_a_device_that_restarts_after_its_own_release_takes_nothing_back() -> None:
+def test_a_device_that_restarts_after_its_own_release_takes_nothing_back():
     story = aloft()
     out = parachute(deployed=True)
     story.at(
@@ -452,7 +444,7 @@ def test_a_device_that_restarts_after_its_own_release_takes_nothing_back() -> No
     assert story.fired() == ["KILL"], "it hangs under the canopy that it had released"
 
 
-def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again() -> None:
+def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again():
     story = released()
     story.state = State(epoch=11, started_at=START + 3.0)
     story.at(3.1, story.heartbeat(), parachute(deployed=True))
@@ -462,7 +454,7 @@ def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again() -> 
     assert len(story.decisions(D)) == fired
 
 
-def test_a_device_node_that_restarts_after_the_release_takes_nothing_back() -> None:
+def test_a_device_node_that_restarts_after_the_release_takes_nothing_back():
     story = released()
     story.seq = -1
     story.at(3.1, story.heartbeat(), parachute(deployed=False, alive=False))
@@ -476,7 +468,7 @@ def test_a_device_node_that_restarts_after_the_release_takes_nothing_back() -> N
     )
 
 
-def test_a_parachute_that_is_exchanged_on_the_ground_is_no_alarm() -> None:
+def test_a_parachute_that_is_exchanged_on_the_ground_is_no_alarm():
     story = released()
     story.fly(8.0, vertical_speed=0.0, height=0.0, **DOWN)
     alarms = story.alarms()
@@ -484,7 +476,7 @@ def test_a_parachute_that_is_exchanged_on_the_ground_is_no_alarm() -> None:
     assert story.alarms() == alarms
 
 
-def test_a_supervisor_that_starts_on_the_ground_with_the_parachute_out_fires_nothing() -> None:
+def test_a_supervisor_that_starts_on_the_ground_with_the_parachute_out_fires_nothing():
     story = Story(shipped("multirotor"))
     for _ in range(30):
         story.at(

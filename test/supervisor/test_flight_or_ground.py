@@ -54,7 +54,7 @@ def known(
         (-1e6, 2.6, False),
     ],
 )
-def test_what_is_old_says_nothing(age: float, at: float, fresh: bool) -> None:
+def test_what_is_old_says_nothing(age, at, fresh):
     story = Story()
     story.at(0.0, vehicle(age=age, armed=Armed.ARMED, landed_state=AIR))
     now = START + at
@@ -79,7 +79,7 @@ def test_what_is_old_says_nothing(age: float, at: float, fresh: bool) -> None:
         (Armed.ARMED, NOTHING, None),
     ],
 )
-def test_before_the_flight(armed: Armed, landed: LandedState, expected: bool | None) -> None:
+def test_before_the_flight(armed, landed, expected):
     story = Story()
     story.at(0.0, vehicle(armed=armed, landed_state=landed))
     assert in_air(story) is expected
@@ -97,9 +97,7 @@ def test_before_the_flight(armed: Armed, landed: LandedState, expected: bool | N
         (Armed.DISARMED, NOTHING, None),
     ],
 )
-def test_in_flight_a_landing_is_believed_only_after_its_hold(
-    armed: Armed, landed: LandedState, expected: bool | None
-) -> None:
+def test_in_flight_a_landing_is_believed_only_after_its_hold(armed, landed, expected):
     story = Story(landing()).flying()
     told = {"armed": armed, "landed_state": landed, "vertical_speed": -0.3, "acceleration": 9.8}
     story.at(0.5, vehicle(**told))
@@ -111,7 +109,7 @@ def test_in_flight_a_landing_is_believed_only_after_its_hold(
     assert (story.state.stage is not Stage.IN_FLIGHT) == down
 
 
-def test_the_core_wakes_when_a_landing_is_to_be_believed() -> None:
+def test_the_core_wakes_when_a_landing_is_to_be_believed():
     story = Story(landing()).flying()
     story.at(0.5, vehicle(armed=Armed.ARMED, landed_state=GROUND))
     story.at(2.0)
@@ -132,14 +130,14 @@ def test_the_core_wakes_when_a_landing_is_to_be_believed() -> None:
         ({}, ""),
     ],
 )
-def test_how_it_moves_as_nothing_on_the_ground_does(told: dict[str, float], words: str) -> None:
+def test_how_it_moves_as_nothing_on_the_ground_does(told, words):
     story = Story()
     story.at(0.0, vehicle(**told))
     assert flight.moving(story.config, story.state, START) == words
 
 
 @pytest.mark.parametrize("sign", [{"vertical_speed": -5.0}, {"acceleration": 1.0}])
-def test_a_landing_that_a_falling_vehicle_reports_is_not_believed(sign: dict[str, float]) -> None:
+def test_a_landing_that_a_falling_vehicle_reports_is_not_believed(sign):
     story = Story(landing()).flying()
     sign, down = {"height": -1.0, **sign}, {"height": -1.0, "landed_state": GROUND}
     for armed in (Armed.ARMED, Armed.DISARMED):
@@ -154,7 +152,7 @@ def test_a_landing_that_a_falling_vehicle_reports_is_not_believed(sign: dict[str
     assert story.state.stage is Stage.READY
 
 
-def test_the_height_of_an_autopilot_that_started_anew_is_not_used() -> None:
+def test_the_height_of_an_autopilot_that_started_anew_is_not_used():
     story = Story(landing()).flying()
     story.fly(0.5, height=80.0)
     now = START + story.t
@@ -172,7 +170,7 @@ def take_off_at(story: Story, latitude: float) -> None:
 
 
 @pytest.mark.parametrize("reset", [False, True])
-def test_a_second_flight_from_another_place_has_another_home(reset: bool) -> None:
+def test_a_second_flight_from_another_place_has_another_home(reset):
     story = Story(with_rules(rule(FAR)))
     take_off_at(story, 48.0)
     for _ in range(20):
@@ -187,7 +185,7 @@ def test_a_second_flight_from_another_place_has_another_home(reset: bool) -> Non
 
 
 @pytest.mark.parametrize("latitude", [math.nan, math.inf, 91.0])
-def test_a_place_that_is_none_is_no_home(latitude: float) -> None:
+def test_a_place_that_is_none_is_no_home(latitude):
     story = Story(with_rules(rule(FAR)))
     take_off_at(story, latitude)
     assert story.state.flight.home is None
@@ -195,7 +193,7 @@ def test_a_place_that_is_none_is_no_home(latitude: float) -> None:
     assert story.fired() == []
 
 
-def test_a_vehicle_state_of_nothing_raises_nothing() -> None:
+def test_a_vehicle_state_of_nothing_raises_nothing():
     story = Story().flying()
     story.at(0.1, i.VehicleReport(VehicleState()))
     assert in_air(story) is None
@@ -227,7 +225,7 @@ def test_a_vehicle_state_of_nothing_raises_nothing() -> None:
         ({"height": 50.0, "landed": NOTHING, "armed": Armed.UNKNOWN}, None),
     ],
 )
-def test_whether_it_is_in_the_air(told: dict[str, Any], in_air: bool | None) -> None:
+def test_whether_it_is_in_the_air(told, in_air):
     parts = {**told}
     armed_height = parts.pop("armed_height", 0.0)
     state = changed(known(**parts), armed_height=armed_height)
@@ -244,8 +242,8 @@ def test_whether_it_is_in_the_air(told: dict[str, Any], in_air: bool | None) -> 
     ],
 )
 def test_one_that_also_says_disarmed_needs_all_signs_and_a_flight_just_before(
-    landed_at: float, height: float, in_air: bool
-) -> None:
+    landed_at, height, in_air
+):
     told = known(armed=Armed.DISARMED, acceleration=1.0, vertical_speed=-9.0, height=height)
     assert flight.in_air(CONFIG, changed(told, landed_at=landed_at), NOW) is in_air
 
@@ -254,9 +252,7 @@ def test_one_that_also_says_disarmed_needs_all_signs_and_a_flight_just_before(
     ("height", "armed_height", "hold"),
     [(10.1, 0.0, 5.0), (10.0, 0.0, 1.0), (35.0, 30.0, 1.0), (40.1, 30.0, 5.0)],
 )
-def test_how_high_above_where_it_was_armed_a_landing_takes_longer(
-    height: float, armed_height: float, hold: float
-) -> None:
+def test_how_high_above_where_it_was_armed_a_landing_takes_longer(height, armed_height, hold):
     config = SupervisorConfig(profile=Profile("tested", (), minimum_height=10.0, landed_hold=1.0))
     state = changed(known(height=height), armed_height=armed_height)
     assert flight.landed_hold(config, state) == hold
@@ -264,7 +260,7 @@ def test_how_high_above_where_it_was_armed_a_landing_takes_longer(
     assert flight.landed_hold(config, off) == 1.0
 
 
-def test_a_word_of_disarmed_in_the_air_moves_no_ground() -> None:
+def test_a_word_of_disarmed_in_the_air_moves_no_ground():
     """Given a wrong heartbeat at 50 m, then a land detector that is wrong for 3 s."""
     story = Story(shipped("multirotor")).ready()
     story.fly(1.0, height=0.0, landed_state=LandedState.ON_GROUND).fly(3.0)
@@ -275,7 +271,7 @@ def test_a_word_of_disarmed_in_the_air_moves_no_ground() -> None:
     assert story.state.stage is Stage.IN_FLIGHT
 
 
-def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_take_off() -> None:
+def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_take_off():
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
     story = Story(with_rules(profile=profile)).flying()
     story.fly(4.95, height=math.nan)
@@ -297,7 +293,7 @@ def told_by_heights(*heights: tuple[float, float]) -> State:
 FALLS = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
 
 
-def test_a_climb_rate_needs_heights_just_so_far_apart_of_which_the_newest_counts() -> None:
+def test_a_climb_rate_needs_heights_just_so_far_apart_of_which_the_newest_counts():
     assert readings.climb_rate(CONFIG, FALLS, 0.4) == pytest.approx(-15.0)
     near = told_by_heights((0.1, 50.0), (0.2, 47.0), (0.4, 44.0))
     assert math.isnan(readings.climb_rate(CONFIG, near, 0.4))
@@ -305,7 +301,7 @@ def test_a_climb_rate_needs_heights_just_so_far_apart_of_which_the_newest_counts
     assert math.isnan(readings.climb_rate(CONFIG, changed(FALLS, heights=()), 0.4))
 
 
-def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own() -> None:
+def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own():
     anew = changed(FALLS, rebooted=True)
     rate = readings.climb_rate(CONFIG, FALLS, 0.4)
     assert readings.climb_rate(CONFIG, anew, 0.4) == rate == pytest.approx(-15.0)
@@ -328,9 +324,7 @@ def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own() -> N
         ([0.05 * n for n in range(9)], 0.5, ""),
     ],
 )
-def test_what_heights_tell_that_come_each_tenth_of_a_second(
-    heights: list[float], rate: float, why: str
-) -> None:
+def test_what_heights_tell_that_come_each_tenth_of_a_second(heights, rate, why):
     state = told_by_heights(*((n / 10, height) for n, height in enumerate(heights)))
     told = readings.reading(CONFIG, state, "climb_rate", (len(heights) - 1) / 10)
     assert told == (pytest.approx(rate, nan_ok=True), why)
@@ -359,7 +353,7 @@ def killed(speed: float = math.nan, force: float = math.nan, at: float = NOW) ->
 LEFT = pytest.approx(100.0 - 2.0 - 9.81 * 2.0)
 
 
-def test_the_height_that_is_left_since_a_kill() -> None:
+def test_the_height_that_is_left_since_a_kill():
     assert flight.height_since_kill(CONFIG, killed(), NOW) == LEFT
     for ground in ({"killed_in_flight": False}, {"killed_standing": True}):
         assert math.isnan(flight.height_since_kill(CONFIG, changed(killed(), **ground), NOW))
@@ -379,15 +373,13 @@ def test_the_height_that_is_left_since_a_kill() -> None:
         ({"speed": 0.0, "force": 9.8, "at": NOW - 0.9}, False),
     ],
 )
-def test_what_was_seen_since_the_kill(told: dict[str, float], falls: bool) -> None:
+def test_what_was_seen_since_the_kill(told, falls):
     left = flight.height_since_kill(CONFIG, killed(**told), NOW)
     assert left == LEFT if falls else math.isnan(left)
 
 
 @pytest.mark.parametrize(("before", "silent"), [(1.0, True), (1.01, False), (-0.5, True)])
-def test_one_that_was_not_heard_until_its_kill_is_not_silent_since(
-    before: float, silent: bool
-) -> None:
+def test_one_that_was_not_heard_until_its_kill_is_not_silent_since(before, silent):
     links = dict.fromkeys(CONFIG.kill_links, LinkEvidence(heard=NOW - 0.1))
     state = changed(killed(), vehicle_received=NOW - 2.0 - before, links=links)
     assert flight.silent_since_kill(CONFIG, state, NOW) is silent

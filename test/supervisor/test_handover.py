@@ -66,7 +66,7 @@ def falling() -> Story:
     return story
 
 
-def test_one_that_follows_decides_and_answers_nothing() -> None:
+def test_one_that_follows_decides_and_answers_nothing():
     story = Story(CONFIG).flying()
     state = handed(story)
     for one in (
@@ -90,7 +90,7 @@ def test_one_that_follows_decides_and_answers_nothing() -> None:
     assert decided(outputs, K)
 
 
-def test_a_deploy_that_waits_for_its_kill_goes_on_at_its_time() -> None:
+def test_a_deploy_that_waits_for_its_kill_goes_on_at_its_time():
     story = falling()
     state = handed(story)
     state, outputs = take_over(state, 1.3)
@@ -104,7 +104,7 @@ def test_a_deploy_that_waits_for_its_kill_goes_on_at_its_time() -> None:
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
-def test_a_shot_that_a_device_has_begun_is_not_shot_again(outcome: Outcome) -> None:
+def test_a_shot_that_a_device_has_begun_is_not_shot_again(outcome):
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, story.heartbeat(), story.report(D, outcome))
@@ -116,7 +116,7 @@ def test_a_shot_that_a_device_has_begun_is_not_shot_again(outcome: Outcome) -> N
     assert state.stage is Stage.DEPLOYED
 
 
-def test_a_shot_that_nobody_has_begun_is_not_lost() -> None:
+def test_a_shot_that_nobody_has_begun_is_not_lost():
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     _, outputs = take_over(handed(story), 1.3)
@@ -124,7 +124,7 @@ def test_a_shot_that_nobody_has_begun_is_not_lost() -> None:
     assert deploy.decision.epoch == 8
 
 
-def test_a_parachute_that_is_out_stays_out_for_the_next_leader() -> None:
+def test_a_parachute_that_is_out_stays_out_for_the_next_leader():
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, parachute(deployed=True))
@@ -133,7 +133,7 @@ def test_a_parachute_that_is_out_stays_out_for_the_next_leader() -> None:
     assert decided(outputs, K) == decided(outputs, D) == []
 
 
-def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_more() -> None:
+def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_more():
     """The leader has not, as nothing reaches it any more."""
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
@@ -167,13 +167,13 @@ def spoilt(**fields: object) -> str:
     ],
     ids=str,
 )
-def test_what_cannot_be_decided_nor_told_is_not_followed(fields: dict[str, object]) -> None:
+def test_what_cannot_be_decided_nor_told_is_not_followed(fields):
     assert followed(follower(), spoilt(), START).stage is Stage.KILLING
     with pytest.raises(RecordError):
         followed(follower(), spoilt(**fields), START)
 
 
-def test_a_decision_under_way_whose_number_no_message_holds_is_not_followed() -> None:
+def test_a_decision_under_way_whose_number_no_message_holds_is_not_followed():
     kill = json.loads(spoilt())["kill"]
     kill["decision"]["id"] = 2**64
     with pytest.raises(RecordError, match="there is no decision"):
@@ -332,14 +332,14 @@ NOBODY: dict[str, Any] = {
 }
 
 
-def test_every_field_is_told_in_the_time_of_the_other_host_or_is_heard_there() -> None:
+def test_every_field_is_told_in_the_time_of_the_other_host_or_is_heard_there():
     follower = changed(State(epoch=1, started_at=HERE), **OWN, leading=False)
     state = followed(follower, told(leader(THERE), THERE), HERE)
     expected = changed(leader(HERE), **OWN, **NOBODY)
     assert every_field(state) == every_field(expected)
 
 
-def test_in_the_test_above_no_field_is_as_at_the_start() -> None:
+def test_in_the_test_above_no_field_is_as_at_the_start():
     start = State(epoch=0, started_at=math.nan)
     one = replace(leader(THERE), own=replace(leader(THERE).own, leading=False))
     first = every_field(start)
@@ -365,14 +365,14 @@ def numbers(hint: Any) -> Iterator[tuple[str, bool]]:
         yield from numbers(argument)
 
 
-def test_every_number_that_is_shared_is_a_time_that_is_moved_or_none() -> None:
+def test_every_number_that_is_shared_is_a_time_that_is_moved_or_none():
     plain = {name for name, is_time in numbers(State) if not is_time}
     assert plain >= NO_TIMES, "gone"
     assert plain <= NO_TIMES, "add them here, or make them a Time"
 
 
 @given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
-def test_what_is_told_is_what_is_followed_with_every_time_moved(there: int, here: int) -> None:
+def test_what_is_told_is_what_is_followed_with_every_time_moved(there, here):
     """Whatever the clocks of the two hosts tell; in parts of a second that add up exactly."""
     state = followed(State(1, 0.0), told(leader(there / 8.0), there / 8.0), here / 8.0)
     expected = replace(leader(here / 8.0), heard=HeardHere(), own=Own(leading=False))
@@ -382,7 +382,7 @@ def test_what_is_told_is_what_is_followed_with_every_time_moved(there: int, here
     assert every_field(nothing) == every_field(State(9, here / 8.0, own=Own(leading=False)))
 
 
-def test_one_that_follows_goes_on_knowing_the_sink_from_the_heights() -> None:
+def test_one_that_follows_goes_on_knowing_the_sink_from_the_heights():
     """Of a source without a vertical speed: it would have to begin anew at every takeover."""
     story = Story(SupervisorConfig(standby=True))
     for tick in range(9):
@@ -408,7 +408,7 @@ ASK_AS_DEPLOY, ASK_AS_TIME = f'{STATE}0,"deploys":[{ASK}]}}', f"{STATE}{ASK}}}"
         (ASK_AS_TIME, f"cannot be read: {AN_ASK} is no float in {ASK_AS_TIME[:80]!r}"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_these_words(text: str, words: str) -> None:
+def test_what_does_not_fit_is_refused_in_these_words(text, words):
     with pytest.raises(RecordError) as refused:
         followed(State(1, HERE), text, HERE)
     assert str(refused.value) == words

@@ -1,7 +1,5 @@
 """Heights stand on the altitude above the sea and the take-off's own, whatever home does."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -53,7 +51,7 @@ def fall(story: Story, height: float, homes: list[float], **told: object) -> flo
     return math.inf
 
 
-def test_disarmed_from_the_ground_a_vehicle_whose_home_falls_with_it_is_deployed() -> None:
+def test_disarmed_from_the_ground_a_vehicle_whose_home_falls_with_it_is_deployed():
     """Given PX4: after a forced disarm in the air it says ON_GROUND, and moves home to itself."""
     story, start = hovering(60.0), 0.0
     start = story.t
@@ -65,7 +63,7 @@ def test_disarmed_from_the_ground_a_vehicle_whose_home_falls_with_it_is_deployed
     assert story.when(Action.DEPLOY) - start < 1.0
 
 
-def test_a_height_that_is_set_to_zero_while_disarmed_hides_no_fall() -> None:
+def test_a_height_that_is_set_to_zero_while_disarmed_hides_no_fall():
     """Given ArduPlane: 45 m become 1 m in a second while it is disarmed."""
     story = hovering(45.0, profile="fixed_wing")
     homes = [min(44.0, 4.4 * k) for k in range(80)]
@@ -79,9 +77,7 @@ def test_a_height_that_is_set_to_zero_while_disarmed_hides_no_fall() -> None:
     homes=st.lists(st.floats(-100.0, 200.0), min_size=1, max_size=20),
     slow=st.floats(-2.0, 2.0),
 )
-def test_whatever_way_home_goes_the_deploy_is_no_later(
-    profile: str, lowest: float, above: float, homes: list[float], slow: float
-) -> None:
+def test_whatever_way_home_goes_the_deploy_is_no_later(profile, lowest, above, homes, slow):
     height = lowest + above
     fixed = fall(hovering(height, profile=profile), height, [0.0])
     assert math.isfinite(fixed)
@@ -94,7 +90,7 @@ def test_whatever_way_home_goes_the_deploy_is_no_later(
 
 
 @pytest.mark.parametrize("home", [-30.0, 12.0, 49.0])
-def test_a_home_that_is_set_elsewhere_in_flight_ends_no_flight(home: float) -> None:
+def test_a_home_that_is_set_elsewhere_in_flight_ends_no_flight(home):
     story = hovering(50.0)
     for _ in range(50):
         tell(story, 50.0, home, 0.1)

@@ -1,7 +1,5 @@
 """The motors were stopped in the air, and nothing tells how it falls; or it was said to stand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import MappingProxyType
@@ -43,7 +41,7 @@ def silence(story: Story, until: float) -> Story:
 
 
 @BOTH
-def test_what_is_silent_since_its_motors_were_stopped_high_is_deployed(profile: str) -> None:
+def test_what_is_silent_since_its_motors_were_stopped_high_is_deployed(profile):
     story = silence(killed(profile, 80.0), 4.0)
     assert story.fired() == ["KILL", "DEPLOY"]
     (deploy,) = story.decisions(D)
@@ -64,8 +62,8 @@ def test_what_is_silent_since_its_motors_were_stopped_high_is_deployed(profile: 
     ],
 )
 def test_one_that_was_not_heard_as_it_was_killed_is_counted_from_its_next_word(
-    later: float, told: dict[str, float], deploys: bool
-) -> None:
+    later, told, deploys
+):
     """Given a node that was started anew, and a kill before it hears of the vehicle."""
     story = silence(Story(shipped("multirotor")).flying().fly(2.0, height=80.0), 3.5)
     story.at(3.5, i.KillRequest(1, "operator", "a person saw it"))
@@ -77,14 +75,14 @@ def test_one_that_was_not_heard_as_it_was_killed_is_counted_from_its_next_word(
     assert story.fired() == ["KILL", "DEPLOY"][: 1 + deploys]
 
 
-def test_what_was_told_after_a_kill_does_not_change_what_was_told_at_it() -> None:
+def test_what_was_told_after_a_kill_does_not_change_what_was_told_at_it():
     story = killed("multirotor", 80.0)
     kept = story.state.killing.killed_height, story.state.killing.killed_sinking
     story.at(2.1, story.told(height=79.9, vertical_speed=-1.0, acceleration=0.5))
     assert (story.state.killing.killed_height, story.state.killing.killed_sinking) == kept
 
 
-def test_one_that_was_killed_as_it_stood_is_not_in_the_air_by_a_height_told_later() -> None:
+def test_one_that_was_killed_as_it_stood_is_not_in_the_air_by_a_height_told_later():
     story = Story(shipped("multirotor")).ready()
     story.at(2.0, i.KillRequest(1, "operator", "on the ground"))
     story.at(2.1, story.told(**DOWN, height=50.0, vertical_speed=0.0))
@@ -92,14 +90,14 @@ def test_one_that_was_killed_as_it_stood_is_not_in_the_air_by_a_height_told_late
     assert "DEPLOY" not in silence(story, 6.0).fired()
 
 
-def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer() -> None:
+def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer():
     story = silence(killed("multirotor", 80.0), 2.0 + WAITS - 0.1)
     assert story.fired() == ["KILL"]
     silence(story, 2.0 + WAITS + 0.1)
     assert story.state.deploying.deploy_rule == "killed aloft and silent"
 
 
-def test_nothing_needs_to_come_for_it() -> None:
+def test_nothing_needs_to_come_for_it():
     """The supervisor wakes by itself when the measurements become too old, and at the hold."""
     config = shipped("multirotor", link_limits=PATIENT)
     story = Story(config).flying().fly(2.0, height=80.0)
@@ -111,13 +109,13 @@ def test_nothing_needs_to_come_for_it() -> None:
     assert story.t == pytest.approx(2.0 + WAITS, abs=0.01)
 
 
-def test_where_nobody_is_heard_it_is_not_the_vehicle_that_is_silent() -> None:
+def test_where_nobody_is_heard_it_is_not_the_vehicle_that_is_silent():
     story = killed("multirotor", 80.0)
     story.at(9.0)
     assert story.fired() == ["KILL"]
 
 
-def test_one_that_was_not_heard_before_its_kill_tells_nothing_by_its_silence() -> None:
+def test_one_that_was_not_heard_before_its_kill_tells_nothing_by_its_silence():
     """A supervisor that has heard of the kill, and never of the vehicle."""
     story = killed("multirotor", 80.0)
     story.state = replace(story.state, heard=replace(story.state.heard, vehicle_received=math.nan))
@@ -125,7 +123,7 @@ def test_one_that_was_not_heard_before_its_kill_tells_nothing_by_its_silence() -
 
 
 @pytest.mark.parametrize("height", [60.0, 600.0])
-def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height: float) -> None:
+def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height):
     """Its motors were stopped before the land detector spoke."""
     story = killed("multirotor", height)
     stands = {**DOWN, "vertical_speed": 0.0, "acceleration": 9.8, "height": height}
@@ -133,21 +131,21 @@ def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height: 
     assert silence(story, 15.0).fired() == ["KILL"]
 
 
-def test_one_that_has_come_down_stays_down_though_nothing_but_its_word_said_so() -> None:
+def test_one_that_has_come_down_stays_down_though_nothing_but_its_word_said_so():
     story = killed("multirotor", 600.0)
     story.fly(4.0, **{**DOWN, **SILENT, "height": 600.0})
     assert math.isnan(story.state.killing.killed_height)
     assert silence(story, 15.0).fired() == ["KILL"], "its word is old by then"
 
 
-def test_one_whose_kill_failed_and_that_flew_on_is_not_deployed() -> None:
+def test_one_whose_kill_failed_and_that_flew_on_is_not_deployed():
     story = killed("multirotor", 80.0)
     story.at(2.1, story.report(Action.KILL, Outcome.FAILED))
     story.fly(4.0, height=80.0)
     assert silence(story, 15.0).fired() == ["KILL"]
 
 
-def test_one_whose_speed_or_force_is_told_is_judged_by_that() -> None:
+def test_one_whose_speed_or_force_is_told_is_judged_by_that():
     for still in ("vertical_speed", "acceleration"):
         told = {name: value for name, value in SILENT.items() if name != still}
         story = killed("multirotor", 80.0).fly(6.0, height=math.nan, **told)
@@ -167,9 +165,7 @@ def test_one_whose_speed_or_force_is_told_is_judged_by_that() -> None:
         (0.0, 0.0, False),
     ],
 )
-def test_it_must_still_be_above_the_minimum_height_without_any_drag(
-    height: float, sinking: float, deploys: bool
-) -> None:
+def test_it_must_still_be_above_the_minimum_height_without_any_drag(height, sinking, deploys):
     story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0)
     story.fly(2.0, every=0.01, height=height, vertical_speed=-sinking)
     story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
@@ -178,19 +174,19 @@ def test_it_must_still_be_above_the_minimum_height_without_any_drag(
 
 
 @pytest.mark.parametrize("told", [{"height": math.nan}, DOWN])
-def test_one_of_unknown_height_or_that_said_that_it_stood_is_not(told: dict[str, Any]) -> None:
+def test_one_of_unknown_height_or_that_said_that_it_stood_is_not(told):
     story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0).fly(1.9, **told)
     story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
     assert silence(story, 9.0).fired() == ["KILL"]
 
 
-def test_one_that_was_unplugged_after_its_landing_is_not() -> None:
+def test_one_that_was_unplugged_after_its_landing_is_not():
     story = Story(shipped("multirotor")).flying().fly(2.0).fly(5.0, height=0.2, **DOWN)
     story.at(5.0, i.KillRequest(1, "operator", "to be sure"))
     assert silence(story, 20.0).fired() == ["KILL"]
 
 
-def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -> None:
+def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed():
     story = Story(shipped("fixed_wing")).flying().fly(2.0, height=80.0)
     story.fly(8.0, height=80.0, landed_state=GROUND)
     assert story.state.stage is Stage.LANDED
@@ -201,7 +197,7 @@ def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -
     assert "it falls since the kill, although it was reported to stand" in story.alarms()
 
 
-def test_one_that_stands_when_it_is_killed_and_is_carried_away_is_not() -> None:
+def test_one_that_stands_when_it_is_killed_and_is_carried_away_is_not():
     story = Story(shipped("fixed_wing")).ready()
     story.fly(2.0, height=0.0, **DOWN)
     story.at(2.0, i.KillRequest(1, "operator", "a test"))

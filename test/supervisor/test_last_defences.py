@@ -23,7 +23,7 @@ def deploying() -> Story:
     return Story(TWO).deploying(LINK, "upf_can")
 
 
-def test_no_step_is_fired_after_a_confirmation_or_beyond_the_last_whoever_asks() -> None:
+def test_no_step_is_fired_after_a_confirmation_or_beyond_the_last_whoever_asks():
     story = deploying()
     (step,) = story.state.deploying.deploys
     confirmed = MappingProxyType({LINK: frozenset({Outcome.CONFIRMED})})
@@ -36,7 +36,7 @@ def test_no_step_is_fired_after_a_confirmation_or_beyond_the_last_whoever_asks()
 @pytest.mark.parametrize(
     "alarms", [(), ("no parachute confirmed within 5.0 s: x",), ("another before it", "the last")]
 )
-def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms: tuple) -> None:
+def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms):
     """A state that contradicts itself, of a black box or of a leader: it still falls."""
     story = deploying()
     due = {"alarms": alarms, "alarm_at": START + 1.2}
@@ -46,7 +46,7 @@ def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms: tup
     assert story.state.alarming.alarm_at == START + 1.2 + story.config.alarm_interval
 
 
-def test_a_step_of_the_ladder_that_addresses_nobody_is_followed_by_the_next() -> None:
+def test_a_step_of_the_ladder_that_addresses_nobody_is_followed_by_the_next():
     story = deploying()
     (step,) = story.state.deploying.deploys
     nobody = replace(step, targets=(), decision=replace(step.decision, targets=()))
@@ -56,7 +56,7 @@ def test_a_step_of_the_ladder_that_addresses_nobody_is_followed_by_the_next() ->
 
 
 @pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
-def test_a_ladder_that_is_found_in_another_mode_sends_nothing_and_ends(mode: i.Mode) -> None:
+def test_a_ladder_that_is_found_in_another_mode_sends_nothing_and_ends(mode):
     story = deploying()
     story.state = replace(story.state, mode=mode)
     count = len(story.decisions(D))
@@ -64,7 +64,7 @@ def test_a_ladder_that_is_found_in_another_mode_sends_nothing_and_ends(mode: i.M
     assert all(decision.shadow for decision in story.decisions(D)[count:])
 
 
-def test_one_that_follows_takes_a_refusal_for_no_reason_to_decide_anew() -> None:
+def test_one_that_follows_takes_a_refusal_for_no_reason_to_decide_anew():
     story = deploying()
     decision = story.newest(D)
     later = Pending(Decision(7, 99, D, "later", (), (LINK,)), (LINK,), START + 1.1, START + 1.1)
@@ -76,7 +76,7 @@ def test_one_that_follows_takes_a_refusal_for_no_reason_to_decide_anew() -> None
     assert len(story.decisions()) == count
 
 
-def test_made_up_devices_that_ask_for_a_kill_do_not_grow_it_and_are_obeyed() -> None:
+def test_made_up_devices_that_ask_for_a_kill_do_not_grow_it_and_are_obeyed():
     story = Story().flying()
     for n in range(2 * MOST_DEVICE_BLOCKS):
         story.at(0.1, i.KillRequest(0, f"made up {n}", "why"))
@@ -84,7 +84,7 @@ def test_made_up_devices_that_ask_for_a_kill_do_not_grow_it_and_are_obeyed() -> 
     assert story.fired() == ["KILL"]
 
 
-def test_time_that_runs_backwards_is_not_followed() -> None:
+def test_time_that_runs_backwards_is_not_followed():
     story = Story().flying().fly(1.0)
     before = story.state
     story._update((story.heartbeat(state=LinkState.OK),), 0.2)

@@ -59,9 +59,7 @@ def heard(*times: float, limits: LinkLimits = LIMITS, **said: Any) -> LinkEviden
         ((1.0, 5.0, 5.6, 6.0, 6.4), 6.6, J.OK),
     ],
 )
-def test_silence_is_judged_by_its_length(
-    times: tuple[float, ...], now: float, judged: LinkJudgement
-) -> None:
+def test_silence_is_judged_by_its_length(times, now, judged):
     assert heard(*times).judged(LIMITS, now) is judged
 
 
@@ -74,7 +72,7 @@ def test_silence_is_judged_by_its_length(
         (LinkState.OK, J.OK),
     ],
 )
-def test_a_node_that_lives_tells_of_its_device(said: LinkState, judged: LinkJudgement) -> None:
+def test_a_node_that_lives_tells_of_its_device(said, judged):
     assert heard(1.0, state=said).judged(LIMITS, 1.1) is judged
 
 
@@ -91,16 +89,16 @@ def beats(*told: tuple[float, i.LinkHeartbeat]) -> LinkEvidence:
     return evidence
 
 
-def test_the_silence_of_the_node_is_worse_than_what_it_said_last() -> None:
+def test_the_silence_of_the_node_is_worse_than_what_it_said_last():
     assert heard(1.0, state=LinkState.STALE).judged(LIMITS, 2.0) is J.LOST
 
 
-def test_a_device_that_was_lost_behind_a_living_node_is_regained_like_a_node() -> None:
+def test_a_device_that_was_lost_behind_a_living_node_is_regained_like_a_node():
     lost = beat(state=LinkState.LOST)
     assert beats((1.0, lost), (1.1, lost), (1.2, beat())).judged(LIMITS, 1.2) is J.REGAINED
 
 
-def test_each_loss_is_counted_once() -> None:
+def test_each_loss_is_counted_once():
     assert heard(1.0, 1.4, 1.8).lost_count == 0
     assert heard(1.0, 5.0, 9.0, 9.4).lost_count == 2
     lost, well = beat(state=LinkState.LOST), beat()
@@ -109,14 +107,14 @@ def test_each_loss_is_counted_once() -> None:
     assert beats((1.0, well), (1.2, lost), (1.4, well), (1.6, lost)).lost_count == 2
 
 
-def test_links_have_limits_of_their_own() -> None:
+def test_links_have_limits_of_their_own():
     slow = LinkLimits(2.0, 4.0, regain_after=0.0)
     assert heard(1.0, limits=slow).judged(slow, 2.9) is J.OK
     assert heard(1.0).judged(LIMITS, 2.9) is J.LOST
     assert heard(1.0, 9.0, limits=slow).judged(slow, 9.0) is J.OK, "nothing to wait for"
 
 
-def test_a_slow_link_is_followed_by_its_own_limits_in_the_whole_core() -> None:
+def test_a_slow_link_is_followed_by_its_own_limits_in_the_whole_core():
     slow = LinkLimits(2.0, 4.0, 1.0, startup_grace=20.0)
     story = Story(SupervisorConfig((LINK, "slow"), link_limits={"slow": slow}))
     for n in range(15):
@@ -129,7 +127,7 @@ def test_a_slow_link_is_followed_by_its_own_limits_in_the_whole_core() -> None:
     assert "slow: STALE, heartbeat of its node 2.00 s old (limit 2 s)" in story.said()
 
 
-def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing() -> None:
+def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing():
     story = Story().ready()
     for n in range(1, 21):
         # Once a second: just lost each time, just heard again each time.
@@ -158,7 +156,7 @@ NEED = "need a number (1.0, not 1) from"
         ((0.5, 1.0, 1.0, 61.0), f"startup_grace is 61.0: {NEED} 0 to 60 s"),
     ],
 )
-def test_limits_past_their_ends_are_told_in_full(wrong: tuple[float, ...], words: str) -> None:
+def test_limits_past_their_ends_are_told_in_full(wrong, words):
     with pytest.raises(ParameterError) as caught:
         LinkLimits(*wrong)
     assert str(caught.value).startswith(f"parameter {words}")
@@ -172,14 +170,14 @@ def status(
     return ParachuteStatus(device, state, ParachuteState.READY, deployed=deployed)
 
 
-def test_what_a_device_said_released_stays_so_while_it_is_lost() -> None:
+def test_what_a_device_said_released_stays_so_while_it_is_lost():
     evidence = LinkEvidence().with_status(status(deployed=True), 3.0)
     evidence = evidence.with_status(status(deployed=False, state=LinkState.LOST), 4.0)
     assert evidence.deployed == {"1/161"}
     assert evidence.released_at == 3.0
 
 
-def test_a_lost_device_cannot_say_that_it_is_released() -> None:
+def test_a_lost_device_cannot_say_that_it_is_released():
     for known in (LinkEvidence(), LinkEvidence().with_status(status(), 3.0)):
         evidence = known.with_status(status(deployed=True, state=LinkState.LOST), 4.0)
         assert evidence.deployed == set()
@@ -188,9 +186,7 @@ def test_a_lost_device_cannot_say_that_it_is_released() -> None:
 
 
 @pytest.mark.parametrize(("uptime", "released"), [(20.9, False), (21.0, False), (21.1, True)])
-def test_what_a_lost_device_says_by_its_own_clock_just_now_is_so(
-    uptime: float, released: bool
-) -> None:
+def test_what_a_lost_device_says_by_its_own_clock_just_now_is_so(uptime, released):
     """Its heartbeats were lost on the way, and its newest status was not."""
     known = LinkEvidence().with_status(replace(status(), uptime=21.0), 3.0)
     told = replace(status(deployed=True, state=LinkState.LOST), uptime=uptime)
@@ -201,7 +197,7 @@ def test_what_a_lost_device_says_by_its_own_clock_just_now_is_so(
     assert evidence.with_status(later, 10.0).deployed == evidence.deployed, "not taken back"
 
 
-def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard() -> None:
+def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard():
     evidence = LinkEvidence()
     for n in range(100):
         evidence = evidence.with_status(status(f"made up {n}"), 1.0)
@@ -210,14 +206,14 @@ def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard() -
     assert evidence.deployed == {"made up 0"}
 
 
-def test_a_heartbeat_tells_its_number_its_device_and_its_clock() -> None:
+def test_a_heartbeat_tells_its_number_its_device_and_its_clock():
     evidence = beats((1.0, beat(seq=8, difference=0.02)), (1.1, beat(seq=9, difference=0.03)))
     assert (evidence.heard, evidence.seq, evidence.clock_difference) == (1.1, 9, 0.03)
     assert evidence.device_healthy
     assert evidence.reported is LinkState.OK
 
 
-def test_it_is_looked_at_again_when_it_grows_stale_lost_or_is_regained() -> None:
+def test_it_is_looked_at_again_when_it_grows_stale_lost_or_is_regained():
     never = beats((2.0, beat())).deadlines(LIMITS)
     assert never[:2] == (2.5, 3.0)
     assert math.isnan(never[2]), "it was never lost"
@@ -232,7 +228,7 @@ def clocks(*told: tuple[float, float]) -> LinkEvidence:
     return beats(*((t, beat(seq=n, difference=d)) for n, (t, d) in enumerate(told)))
 
 
-def test_a_clock_is_judged_by_the_smallest_difference_of_this_spell_and_the_one_before() -> None:
+def test_a_clock_is_judged_by_the_smallest_difference_of_this_spell_and_the_one_before():
     first = clocks((10.0, 0.5), (10.5, 0.3), (10.9, 0.4))
     assert (first.clock_spell_since, first.clock_least) == (10.0, 0.3)
     assert math.isnan(first.clocks_differ_by), "one spell is not enough"
@@ -244,9 +240,7 @@ def test_a_clock_is_judged_by_the_smallest_difference_of_this_spell_and_the_one_
 
 
 @pytest.mark.parametrize(("pause", "known"), [(2.9, True), (3.0, False), (3.5, False)])
-def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(
-    pause: float, known: bool
-) -> None:
+def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(pause, known):
     after = clocks((10.0, 0.5), (10.0 + pause, 0.6))
     assert after.clock_least == 0.6
     assert after.clock_least_before == 0.5 if known else math.isnan(after.clock_least_before)
@@ -254,8 +248,8 @@ def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.sampled_from(LinkState)), max_size=30))
 def test_between_two_heartbeats_a_link_only_gets_worse_or_is_relied_on_after_its_wait(
-    beats: list[tuple[float, LinkState]],
-) -> None:
+    beats,
+):
     now, evidence = 100.0, LinkEvidence()
     for seq, (wait, said) in enumerate(beats):
         judged = {evidence.judged(LIMITS, now + wait * part) for part in (0.0, 0.3, 0.6, 0.99)}
@@ -286,7 +280,7 @@ def numbered(story: Story, *numbers: int, healthy: bool = True) -> None:
 
 
 @pytest.mark.parametrize("second", [3, 100, 101, 104, 5000])
-def test_two_nodes_of_one_name_are_one_clear_reason_and_no_flapping(second: int) -> None:
+def test_two_nodes_of_one_name_are_one_clear_reason_and_no_flapping(second):
     """Given that the second one has no device."""
     story = Story(shipped("multirotor")).ready()
     numbered(story, *range(100, 110))
@@ -302,7 +296,7 @@ def test_two_nodes_of_one_name_are_one_clear_reason_and_no_flapping(second: int)
     assert story.state.stage is Stage.READY
 
 
-def test_decisions_are_not_repeated_at_each_word_of_two_nodes() -> None:
+def test_decisions_are_not_repeated_at_each_word_of_two_nodes():
     story = Story(shipped("multirotor")).ready()
     numbered(story, *range(100, 110))
     before = len(story.decisions())
@@ -312,7 +306,7 @@ def test_decisions_are_not_repeated_at_each_word_of_two_nodes() -> None:
 
 
 @pytest.mark.parametrize("numbers", [(1, 2, 3, 4, 5), (1, 3, 4, 6), (3, 1, 2, 3, 4, 5, 6)])
-def test_one_that_restarts_again_and_again_is_not_two(numbers: tuple[int, ...]) -> None:
+def test_one_that_restarts_again_and_again_is_not_two(numbers):
     story = Story(shipped("multirotor")).ready()
     numbered(story, *range(100, 110))
     for _ in range(3):

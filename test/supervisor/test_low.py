@@ -1,7 +1,5 @@
 """Low above the ground a deploy waits for its kill no longer than the ground lets it."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import replace
@@ -41,9 +39,7 @@ def falls_from(height: float, profile: str = "multirotor", **settings: Any) -> S
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 @pytest.mark.parametrize(("height", "waits"), [(32.0, 0.2), (70.0, 0.5)])
-def test_what_falls_low_is_released_before_the_half_second_is_over(
-    profile: str, height: float, waits: float
-) -> None:
+def test_what_falls_low_is_released_before_the_half_second_is_over(profile, height, waits):
     story = falls_from(height, profile)
     assert waited(story) == waits
     (told,) = [one for one in story.newest(D).reasons if "not confirmed" in one]
@@ -53,23 +49,21 @@ def test_what_falls_low_is_released_before_the_half_second_is_over(
 
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
-def test_below_30_m_is_low(profile: str) -> None:
+def test_below_30_m_is_low(profile):
     assert shipped(profile).profile.low_height == 30.0
 
 
 @pytest.mark.parametrize(
     ("delay", "low", "waits"), [(0.5, 0.3, 0.3), (0.1, 0.2, 0.1), (0.2, 0.2, 0.2), (0.5, 0.0, 0.0)]
 )
-def test_how_long_can_be_set_and_it_is_never_longer_than_elsewhere(
-    delay: float, low: float, waits: float
-) -> None:
+def test_how_long_can_be_set_and_it_is_never_longer_than_elsewhere(delay, low, waits):
     settings = {"kill_to_deploy_delay": delay, "low_kill_to_deploy_delay": low}
     story = falls_from(30.5, **settings)
     assert waited(story) == waits
     assert ("below 30 m" in "; ".join(story.newest(D).reasons)) is (low < delay)
 
 
-def test_what_comes_low_as_it_waits_waits_no_longer() -> None:
+def test_what_comes_low_as_it_waits_waits_no_longer():
     """A few decimetres more of height must not put the release off by three tenths."""
     waits = [waited(falls_from(height / 10.0)) for height in range(320, 420, 4)]
     assert waits == sorted(waits)
@@ -77,7 +71,7 @@ def test_what_comes_low_as_it_waits_waits_no_longer() -> None:
 
 
 @pytest.mark.parametrize(("height", "waits"), [(45.0, 0.2), (90.0, 0.5)])
-def test_what_fell_silent_is_taken_to_have_fallen_since(height: float, waits: float) -> None:
+def test_what_fell_silent_is_taken_to_have_fallen_since(height, waits):
     """Given an IMU that tells the fall, and an autopilot that told the height 2.5 s ago."""
     story = Story(shipped("multirotor")).ready().fly(1.0, height=height)
     story.fly(story.t + 2.6, **IMU_FALLS)
@@ -89,7 +83,7 @@ def test_what_fell_silent_is_taken_to_have_fallen_since(height: float, waits: fl
 
 
 @pytest.mark.parametrize("silent", [1.0, 3.0, 10.0])
-def test_what_was_low_stays_so_however_long_its_height_is_not_told(silent: float) -> None:
+def test_what_was_low_stays_so_however_long_its_height_is_not_told(silent):
     story = Story(shipped("multirotor")).ready().fly(1.0, height=25.0)
     story.fly(story.t + silent, **IMU_FLIES)
     story.fly(story.t + 2.6, **IMU_FALLS, **LOST)
@@ -97,7 +91,7 @@ def test_what_was_low_stays_so_however_long_its_height_is_not_told(silent: float
     assert waited(story) == 0.2
 
 
-def test_what_a_person_wants_down_is_not_taken_to_fall() -> None:
+def test_what_a_person_wants_down_is_not_taken_to_fall():
     """Its motors may turn, and its words alone not arrive."""
     story = Story(shipped("multirotor")).ready().fly(1.0, height=45.0)
     story.alive(story.t + 2.0)
@@ -106,7 +100,7 @@ def test_what_a_person_wants_down_is_not_taken_to_fall() -> None:
     assert waited(story) == 0.5
 
 
-def test_a_person_who_wants_it_as_well_as_a_rule_makes_it_no_later() -> None:
+def test_a_person_who_wants_it_as_well_as_a_rule_makes_it_no_later():
     story = Story(shipped("multirotor")).ready().fly(1.0, height=45.0)
     story.fly(story.t + 2.6, **IMU_FALLS)
     while not story.state.deploying.deploy_rule:
@@ -122,14 +116,14 @@ def test_a_person_who_wants_it_as_well_as_a_rule_makes_it_no_later() -> None:
 
 
 @pytest.mark.parametrize(("height", "waits"), [(29.9, 0.2), (30.1, 0.5)])
-def test_what_a_person_sees_low_is_released_as_soon(height: float, waits: float) -> None:
+def test_what_a_person_sees_low_is_released_as_soon(height, waits):
     story = Story(shipped("multirotor")).flying().fly(2.0, height=height)
     story.at(2.0, i.DeployRequest(5, False, "it burns"))
     story.fly(3.0, height=height)
     assert waited(story) == waits
 
 
-def test_what_stands_is_not_low_as_people_stand_beside_its_motors() -> None:
+def test_what_stands_is_not_low_as_people_stand_beside_its_motors():
     story = Story(shipped("multirotor")).ready()
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, True, "bench test"))
     story.alive(2.0)
@@ -139,7 +133,7 @@ def test_what_stands_is_not_low_as_people_stand_beside_its_motors() -> None:
 @pytest.mark.parametrize(
     ("height", "waits"), [(-29.9, 0.2), (-30.1, 0.5), (math.nan, 0.5), (0.0, 0.2)]
 )
-def test_far_below_the_take_off_or_unknown_is_not_low(height: float, waits: float) -> None:
+def test_far_below_the_take_off_or_unknown_is_not_low(height, waits):
     story = Story(with_rules(profile={"low_height": 30.0})).flying()
     story.fly(1.0, height=height)
     story.at(1.0, i.DeployRequest(5, False, "it burns"))
@@ -147,14 +141,14 @@ def test_far_below_the_take_off_or_unknown_is_not_low(height: float, waits: floa
     assert waited(story) == waits
 
 
-def test_without_a_low_height_in_its_profile_nothing_is_low() -> None:
+def test_without_a_low_height_in_its_profile_nothing_is_low():
     story = Story(with_rules()).flying().fly(1.0, height=0.5)
     story.at(1.0, i.DeployRequest(5, False, "it burns"))
     story.fly(2.0, height=0.5)
     assert waited(story) == 0.5
 
 
-def test_the_wait_counts_from_a_kill_that_was_under_way() -> None:
+def test_the_wait_counts_from_a_kill_that_was_under_way():
     story = Story(shipped("multirotor")).flying().fly(2.0, height=20.0)
     story.at(2.0, i.KillRequest(4, "operator", "stop"))
     story.at(2.15, i.DeployRequest(5, False, "and now it falls"))
@@ -163,7 +157,7 @@ def test_the_wait_counts_from_a_kill_that_was_under_way() -> None:
     assert story.state.stage is Stage.DEPLOYING
 
 
-def test_a_confirmed_kill_is_not_waited_for_low_or_high() -> None:
+def test_a_confirmed_kill_is_not_waited_for_low_or_high():
     for height in (20.0, 80.0):
         story = Story(shipped("multirotor")).flying().fly(2.0, height=height)
         story.at(2.0, i.DeployRequest(5, False, "it falls"))
@@ -172,7 +166,7 @@ def test_a_confirmed_kill_is_not_waited_for_low_or_high() -> None:
         assert "kill confirmed after 0.05 s (limit 0.5 s)" in story.newest(D).reasons
 
 
-def test_it_wakes_by_itself_when_the_fall_may_have_come_low() -> None:
+def test_it_wakes_by_itself_when_the_fall_may_have_come_low():
     story = Story(shipped("multirotor")).ready().fly(1.0, height=60.0)
     story.fly(story.t + 2.6, **IMU_FALLS)
     while not story.state.deploying.deploy_rule:
@@ -237,18 +231,18 @@ def in_flight(height: float, speed: float = math.nan, at: float = 100.0, **besid
         (in_flight(65.0, took_off_height=40.0, armed_height=40.0), True, 102.671),
     ],
 )
-def test_since_when_it_is_low(state: State, falls: bool, at: float) -> None:
+def test_since_when_it_is_low(state, falls, at):
     config = shipped("multirotor")
     assert flight.low_at(config, state, falls, 100.5) == pytest.approx(at, abs=1e-3)
 
 
-def test_a_height_that_claims_to_come_from_the_future_came_just_now() -> None:
+def test_a_height_that_claims_to_come_from_the_future_came_just_now():
     config = shipped("multirotor")
     assert flight.low_at(config, in_flight(25.0), True, 96.0) == 96.0
     assert flight.low_at(config, in_flight(49.62), True, 96.0) == pytest.approx(98.0)
 
 
-def test_one_that_stands_or_was_never_heard_is_not_low() -> None:
+def test_one_that_stands_or_was_never_heard_is_not_low():
     config = shipped("multirotor")
     assert (
         flight.low_at(
@@ -265,5 +259,5 @@ def test_one_that_stands_or_was_never_heard_is_not_low() -> None:
     )
 
 
-def test_an_old_height_of_what_nobody_saw_fall_says_nothing() -> None:
+def test_an_old_height_of_what_nobody_saw_fall_says_nothing():
     assert flight.low_at(shipped("multirotor"), in_flight(20.0), False, 101.1) == math.inf

@@ -60,9 +60,7 @@ def after(*samples: tuple[float, float], limits: Limits = LIMITS) -> Measured:
         ([*SAME, (-3.0000001, 15.5)], 15.5, -3.0000001),
     ],
 )
-def test_a_sample_that_can_be_is_used(
-    samples: list[tuple[float, float]], now: float, used: float
-) -> None:
+def test_a_sample_that_can_be_is_used(samples, now, used):
     known = after(*samples)
     assert known.unusable(LIMITS, now) == ""
     assert known.usable(LIMITS, now) == used
@@ -92,9 +90,7 @@ def test_a_sample_that_can_be_is_used(
         ([*SAME, (-3.0, 15.5)], 15.5, "stuck at -3 for 5.5 s (limit 5 s)"),
     ],
 )
-def test_a_sample_that_cannot_be_is_not_used_and_says_why(
-    samples: list[tuple[float, float]], now: float, words: str
-) -> None:
+def test_a_sample_that_cannot_be_is_not_used_and_says_why(samples, now, words):
     known = after(*samples)
     assert known.unusable(LIMITS, now) == words
     assert math.isnan(known.usable(LIMITS, now))
@@ -110,7 +106,7 @@ def test_a_sample_that_cannot_be_is_not_used_and_says_why(
         (-401.0, "-401 is out of -400 to 400"),
     ],
 )
-def test_what_was_known_is_not_overwritten_by_what_cannot_be(value: float, words: str) -> None:
+def test_what_was_known_is_not_overwritten_by_what_cannot_be(value, words):
     assert after((value, 10.0)).unusable(LIMITS, 10.0) == words
     known = after((1.0, 9.9), (value, 10.0))
     assert known.unusable(LIMITS, 10.0) == words
@@ -118,7 +114,7 @@ def test_what_was_known_is_not_overwritten_by_what_cannot_be(value: float, words
     assert known.with_sample(Sample(1.1, 10.1), LIMITS).unusable(LIMITS, 10.1) == ""
 
 
-def test_its_age_counts_from_the_measurement_not_from_its_receipt() -> None:
+def test_its_age_counts_from_the_measurement_not_from_its_receipt():
     story = Story()
     story.at(0.0, vehicle(age=0.9, vertical_speed=-3.0))
     measured = story.state.measured("vertical_speed")
@@ -126,14 +122,14 @@ def test_its_age_counts_from_the_measurement_not_from_its_receipt() -> None:
     assert measured.unusable(LIMITS, START + 0.2) == "old: 1.10 s (limit 1 s)"
 
 
-def test_samples_that_jump_about_confirm_each_other_not() -> None:
+def test_samples_that_jump_about_confirm_each_other_not():
     wild = [(-300.0 if n % 2 else 300.0, 10.05 + n * 0.05) for n in range(10)]
     known = after((0.0, 10.0), *wild)
     assert known.unusable(LIMITS, 10.5)
     assert known.value == 0.0
 
 
-def test_a_bad_sample_leaves_what_was_known_and_forgets_what_jumped() -> None:
+def test_a_bad_sample_leaves_what_was_known_and_forgets_what_jumped():
     known = after((0.0, 10.0), (300.0, 10.05), (301.0, 10.1), (NAN, 10.15), (302.0, 10.2))
     assert "jumped" in known.unusable(LIMITS, 10.2)
     assert known.candidates == 1, "the confirmation begins anew"
@@ -144,7 +140,7 @@ def test_a_bad_sample_leaves_what_was_known_and_forgets_what_jumped() -> None:
     assert again.unusable(LIMITS, 15.1) == "jumped by +93 in 0.090 s"
 
 
-def test_a_sample_that_was_overtaken_or_is_told_again_or_has_no_time_changes_nothing() -> None:
+def test_a_sample_that_was_overtaken_or_is_told_again_or_has_no_time_changes_nothing():
     for known, value, at in (
         (after((1.0, 10.0)), 1.1, 9.95),
         # Late by the jitter.
@@ -173,11 +169,11 @@ def test_a_sample_that_was_overtaken_or_is_told_again_or_has_no_time_changes_not
         ([(1.0, NAN), (1.1, NAN)], 0),
     ],
 )
-def test_each_sample_counts_once(samples: list[tuple[float, float]], count: int) -> None:
+def test_each_sample_counts_once(samples, count):
     assert after(*samples).count == count
 
 
-def test_a_battery_may_stay_the_same_for_ever_and_another_be_stuck_in_less_than_a_second() -> None:
+def test_a_battery_may_stay_the_same_for_ever_and_another_be_stuck_in_less_than_a_second():
     limits = STANDARD_LIMITS["battery_remaining"]
     known = after(*((0.5, float(n)) for n in range(100)), limits=limits)
     assert known.unusable(limits, 99.0) == ""
@@ -187,7 +183,7 @@ def test_a_battery_may_stay_the_same_for_ever_and_another_be_stuck_in_less_than_
 
 
 @pytest.mark.parametrize("tilt", [0.0, 180.0])
-def test_a_vehicle_may_stand_upright_and_lie_on_its_back(tilt: float) -> None:
+def test_a_vehicle_may_stand_upright_and_lie_on_its_back(tilt):
     limits = STANDARD_LIMITS["tilt_deg"]
     assert after((tilt, 10.0), limits=limits).usable(limits, 10.0) == tilt
 
@@ -203,7 +199,7 @@ def heights(*samples: tuple[float, float]) -> Measured:
     return after(*samples, limits=HEIGHT)
 
 
-def test_a_jump_that_is_confirmed_is_remembered_with_what_was_before() -> None:
+def test_a_jump_that_is_confirmed_is_remembered_with_what_was_before():
     known = heights(*DOWN)
     assert (known.jumped_at, known.before_jump, known.doubted_at) == (0.2, 100.0, 0.15)
     # So is one that time made possible meanwhile.
@@ -213,7 +209,7 @@ def test_a_jump_that_is_confirmed_is_remembered_with_what_was_before() -> None:
 
 
 @pytest.mark.parametrize("then", [99.9, 85.0])
-def test_one_that_goes_back_or_half_way_has_not_jumped(then: float) -> None:
+def test_one_that_goes_back_or_half_way_has_not_jumped(then):
     known = heights((100.0, 0.0), (70.0, 0.1), (then, 0.2))
     assert known.value == then
     assert math.isnan(known.jumped_at)
@@ -221,21 +217,21 @@ def test_one_that_goes_back_or_half_way_has_not_jumped(then: float) -> None:
 
 
 @pytest.mark.parametrize(("back_to", "over"), [(90.0, True), (89.9, False)])
-def test_a_jump_back_ends_the_doubt(back_to: float, over: bool) -> None:
+def test_a_jump_back_ends_the_doubt(back_to, over):
     known = heights(*DOWN, (back_to + 0.2, 0.3), (back_to + 0.1, 0.35), (back_to, 0.4))
     assert known.value == back_to
     assert math.isnan(known.jumped_at) is over
     assert math.isnan(known.before_jump) is over
 
 
-def test_after_one_out_of_range_it_is_doubted_for_a_second_but_not_after_none() -> None:
+def test_after_one_out_of_range_it_is_doubted_for_a_second_but_not_after_none():
     known = heights((100.0, 0.0), (9999.0, 0.1), (100.1, 0.2))
     assert known.doubted_at == 0.1
     assert "another was not taken" in known.doubt("height", 0.3)
     assert math.isnan(heights((100.0, 0.0), (math.nan, 0.1), (100.1, 0.2)).doubted_at)
 
 
-def test_what_cannot_be_at_all_forgets_what_was_doubted() -> None:
+def test_what_cannot_be_at_all_forgets_what_was_doubted():
     known = heights((100.0, 0.0), (60.0, 0.1), (9999.0, 0.15))
     assert known.candidates == 0
     again = known.with_sample(Sample(60.0, 0.16), HEIGHT)
@@ -245,7 +241,7 @@ def test_what_cannot_be_at_all_forgets_what_was_doubted() -> None:
 # -- samples of a vehicle state ------------------------------------------------------------------
 
 
-def test_every_part_of_a_vehicle_state_becomes_a_sample_with_its_own_time() -> None:
+def test_every_part_of_a_vehicle_state_becomes_a_sample_with_its_own_time():
     state = VehicleState(
         height=12.0,
         height_age=0.1,
@@ -278,7 +274,7 @@ def test_every_part_of_a_vehicle_state_becomes_a_sample_with_its_own_time() -> N
     }
 
 
-def test_without_a_take_off_or_a_place_there_is_no_distance_between_them() -> None:
+def test_without_a_take_off_or_a_place_there_is_no_distance_between_them():
     assert "distance_from_home" not in samples_of(VehicleState(), 100.0, None)
     sample = samples_of(VehicleState(position_age=0.5), 100.0, (48.0, 11.0))["distance_from_home"]
     assert math.isnan(sample.value)
@@ -298,13 +294,11 @@ def test_without_a_take_off_or_a_place_there_is_no_distance_between_them() -> No
         ((60.0, 0.0), (30.0, 90.0), 7_154_403.0),
     ],
 )
-def test_the_way_over_ground(
-    one: tuple[float, float], other: tuple[float, float], metres: float
-) -> None:
+def test_the_way_over_ground(one, other, metres):
     assert distance_between(one, other) == pytest.approx(metres, abs=1.0)
 
 
-def test_a_place_that_is_not_on_earth_is_no_distance() -> None:
+def test_a_place_that_is_not_on_earth_is_no_distance():
     for nowhere in (
         (NAN, 11.0),
         (48.0, NAN),
@@ -339,13 +333,13 @@ def test_a_place_that_is_not_on_earth_is_no_distance() -> None:
         ("max_age", 60.5, "max_age is 60.5: need above 0, up to 60 s"),
     ],
 )
-def test_limits_past_their_ends_are_told_in_full(name: str, wrong: float, words: str) -> None:
+def test_limits_past_their_ends_are_told_in_full(name, wrong, words):
     with pytest.raises(ParameterError) as caught:
         dataclasses.replace(LIMITS, **{name: wrong})
     assert str(caught.value) == words
 
 
-def test_limits_may_reach_their_ends() -> None:
+def test_limits_may_reach_their_ends():
     strict = Limits(0.0, 1.0, rate=0.0, jump=0.0, max_age=0.001, stuck_after=0.0)
     assert dataclasses.replace(strict, max_age=60.0).max_age == 60.0
 
@@ -356,8 +350,8 @@ AGES = st.one_of(st.floats(), st.floats(0.0, 3.0))
 
 @given(st.lists(st.tuples(st.floats(0.0, 2.0), VALUES, AGES), max_size=30))
 def test_what_can_be_used_is_always_young_within_its_range_and_was_told(
-    told: list[tuple[float, float, float]],
-) -> None:
+    told,
+):
     now, known, values = 100.0, Measured(), set()
     for wait, value, age in told:
         now += wait

@@ -1,7 +1,5 @@
 """What hangs on its motors falls without them: a kill in the air brings the deploy at once."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -21,14 +19,14 @@ def killed(profile: str, height: float, kill_only: bool = False) -> Story:
     return story
 
 
-def test_a_confirmed_kill_of_a_multirotor_is_followed_by_the_deploy_at_once() -> None:
+def test_a_confirmed_kill_of_a_multirotor_is_followed_by_the_deploy_at_once():
     story = killed("multirotor", 50.0)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.newest(D).rule == "motors stopped in flight"
     assert story.when(D) == pytest.approx(2.05)
 
 
-def test_one_that_is_not_confirmed_is_not() -> None:
+def test_one_that_is_not_confirmed_is_not():
     story = Story(shipped("multirotor")).ready().fly(2.0)
     story.at(2.0, i.KillRequest(1, "operator", "flies away"))
     story.fly(2.4)
@@ -36,13 +34,13 @@ def test_one_that_is_not_confirmed_is_not() -> None:
 
 
 @pytest.mark.parametrize(("profile", "height"), [("fixed_wing", 50.0), ("multirotor", 8.0)])
-def test_what_glides_or_is_too_low_is_not(profile: str, height: float) -> None:
+def test_what_glides_or_is_too_low_is_not(profile, height):
     story = killed(profile, height).fly(2.3, height=height)
     assert story.fired() == ["KILL"]
 
 
 @pytest.mark.parametrize(("sink", "deploys"), [(5.0, False), (12.0, True)])
-def test_an_aeroplane_that_was_killed_glides_or_dives(sink: float, deploys: bool) -> None:
+def test_an_aeroplane_that_was_killed_glides_or_dives(sink, deploys):
     """Carried in full, as in a glide and as in a spiral."""
     story, off = killed("fixed_wing", 120.0), {"armed": Armed.DISARMED}
     sinking, height = 0.0, 120.0
@@ -56,7 +54,7 @@ def test_an_aeroplane_that_was_killed_glides_or_dives(sink: float, deploys: bool
         assert story.when(D) - 2.05 < 3.0
 
 
-def test_a_person_may_ask_for_the_kill_alone() -> None:
+def test_a_person_may_ask_for_the_kill_alone():
     story = killed("multirotor", 50.0, kill_only=True).fly(2.3)
     off = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
     story.fall(3.8, height=50.0, **off)
@@ -70,8 +68,8 @@ def test_a_person_may_ask_for_the_kill_alone() -> None:
 
 @pytest.mark.parametrize("failed", [True, False])
 def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(
-    failed: bool,
-) -> None:
+    failed,
+):
     """Given an autopilot that refuses the kill, or never answers; it hovers on, and falls."""
     story = Story(shipped("multirotor")).ready().fly(2.0, height=60.0)
     story.at(2.0, i.KillRequest(1, "operator", "flies away", kill_only=True))
@@ -84,7 +82,7 @@ def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(
     assert "DEPLOY" in story.fired()
 
 
-def test_a_kill_alone_of_what_falls_is_followed_by_no_deploy_though_nobody_confirms_it() -> None:
+def test_a_kill_alone_of_what_falls_is_followed_by_no_deploy_though_nobody_confirms_it():
     """Given an autopilot without power, and a person who wants it to come down as it is."""
     story = Story(shipped("multirotor")).ready().fly(2.0, height=60.0)
     story.at(2.0, i.KillRequest(1, "operator", "nobody below", kill_only=True))
@@ -110,8 +108,8 @@ UNKNOWN = math.nan
     ("height", "by_pressure"), [(UNKNOWN, 60.0), (UNKNOWN, UNKNOWN), (-55.0, -55.0), (3.0, 60.0)]
 )
 def test_whatever_tells_that_it_is_high_the_deploy_follows_a_confirmed_kill_at_once(
-    height: float, by_pressure: float
-) -> None:
+    height, by_pressure
+):
     """Given no estimated height, a valley below the take-off, or an estimator that is wrong."""
     story = Story(shipped("multirotor"))
     known = not math.isnan(by_pressure)
@@ -131,7 +129,7 @@ def test_whatever_tells_that_it_is_high_the_deploy_follows_a_confirmed_kill_at_o
 
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
-def test_disarmed_in_the_air_by_whomever_it_is_deployed(profile: str) -> None:
+def test_disarmed_in_the_air_by_whomever_it_is_deployed(profile):
     story = Story(shipped(profile)).ready().fly(2.0, height=80.0)
     for k in range(50):
         said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
@@ -141,7 +139,7 @@ def test_disarmed_in_the_air_by_whomever_it_is_deployed(profile: str) -> None:
 
 
 @pytest.mark.parametrize("told_since", [0.0, 1.2])
-def test_a_fall_that_drag_soon_carries_is_seen_as_well(told_since: float) -> None:
+def test_a_fall_that_drag_soon_carries_is_seen_as_well(told_since):
     """PX4's SIH: after a disarm by the ground station it sank with 10 m/s, all of its weight
     carried; the half second without force may be lost on its way."""
     story, height = Story(shipped("multirotor")).ready().fly(2.0, height=60.0), 60.0
@@ -158,7 +156,7 @@ def test_a_fall_that_drag_soon_carries_is_seen_as_well(told_since: float) -> Non
     assert story.when(D) - 2.0 < (1.2 if told_since == 0.0 else 3.0)
 
 
-def test_one_that_descends_fast_and_whose_heartbeat_is_wrong_is_not() -> None:
+def test_one_that_descends_fast_and_whose_heartbeat_is_wrong_is_not():
     """What still turns carries: of motors that stop, force is missing at once."""
     story, height = Story(shipped("multirotor")).ready().fly(2.0, height=120.0), 120.0
     for k in range(1, 90):
@@ -190,14 +188,14 @@ def dropped(mav_type: int, stands_after: float, heard: bool = True, disarms: boo
     return story
 
 
-def test_a_word_of_disarmed_beside_one_of_in_the_air_ends_no_flight() -> None:
+def test_a_word_of_disarmed_beside_one_of_in_the_air_ends_no_flight():
     """PX4 and ArduCopter say that they stand once they are disarmed in the air."""
     assert dropped(QUADROTOR, math.inf).fired() == dropped(QUADROTOR, 0.0, disarms=False).fired()
     assert dropped(QUADROTOR, math.inf).fired() == []
 
 
 @pytest.mark.parametrize("stands_after", [0.0, 0.35])
-def test_one_that_says_then_that_it_stands_is_released(stands_after: float) -> None:
+def test_one_that_says_then_that_it_stands_is_released(stands_after):
     story = dropped(QUADROTOR, stands_after)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.newest(D).rule == "disarmed in flight"
@@ -205,19 +203,19 @@ def test_one_that_says_then_that_it_stands_is_released(stands_after: float) -> N
 
 
 @pytest.mark.parametrize("mav_type", [QUADPLANE, UNTOLD])
-def test_the_autopilot_of_a_wing_may_go_on_to_say_in_the_air(mav_type: int) -> None:
+def test_the_autopilot_of_a_wing_may_go_on_to_say_in_the_air(mav_type):
     """ArduPlane does."""
     assert dropped(mav_type, math.inf).fired() == ["KILL", "DEPLOY"]
 
 
-def test_what_it_said_before_is_no_word_against_it() -> None:
+def test_what_it_said_before_is_no_word_against_it():
     """Given an EXTENDED_SYS_STATE that comes no more."""
     story = dropped(QUADROTOR, math.inf, heard=False)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(Action.KILL) < 2.9
 
 
-def test_landed_on_a_roof_and_disarmed_it_is_not() -> None:
+def test_landed_on_a_roof_and_disarmed_it_is_not():
     story = Story(shipped("multirotor")).ready().fly(2.0, height=30.0)
     said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
     story.fly(20.0, height=30.0, vertical_speed=0.0, **said)

@@ -1,7 +1,5 @@
 """A node whose computer is too busy tells of what was: said before flight, and in flight."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from story import LINK, START, Story, shipped
@@ -20,7 +18,7 @@ def beat(story: Story, behind: float) -> i.LinkHeartbeat:
     return replace(story.heartbeat(), behind=behind)
 
 
-def test_on_the_ground_it_forbids_take_off_until_it_keeps_up() -> None:
+def test_on_the_ground_it_forbids_take_off_until_it_keeps_up():
     story = Story(shipped("multirotor")).ready()
     story.at(story.t + 0.1, beat(story, 0.5))
     assert story.state.stage is Stage.READY
@@ -31,7 +29,7 @@ def test_on_the_ground_it_forbids_take_off_until_it_keeps_up() -> None:
     assert story.state.stage is Stage.READY
 
 
-def test_in_flight_it_is_an_alarm_once_and_takes_nothing_back() -> None:
+def test_in_flight_it_is_an_alarm_once_and_takes_nothing_back():
     story = Story(shipped("multirotor")).ready().fly(1.0)
     for _ in range(3):
         story.at(story.t + 0.1, beat(story, 0.8))

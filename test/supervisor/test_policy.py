@@ -45,7 +45,7 @@ def alarms(story: Story) -> int:
 # -- where a rule lives --------------------------------------------------------------------------
 
 
-def test_a_rule_is_counted_only_in_its_states() -> None:
+def test_a_rule_is_counted_only_in_its_states():
     story = Story(with_rules(rule(TILTS, action=ALARM, states=(Stage.IN_FLIGHT,)))).ready()
     story.fly(0.5, tilt=90.0, **DOWN)
     assert alarms(story) == 0
@@ -53,7 +53,7 @@ def test_a_rule_is_counted_only_in_its_states() -> None:
     assert alarms(story) == 1
 
 
-def test_what_was_counted_in_another_state_says_nothing_in_the_next() -> None:
+def test_what_was_counted_in_another_state_says_nothing_in_the_next():
     in_both = (Stage.IN_FLIGHT, Stage.LANDED)
     short = rule(TILTS, action=ALARM, states=(Stage.IN_FLIGHT,), hold=1.0, name="short")
     long = rule(TILTS, action=ALARM, states=in_both, hold=1.0, name="long")
@@ -65,7 +65,7 @@ def test_what_was_counted_in_another_state_says_nothing_in_the_next() -> None:
     assert [one.split(":")[0] for one in story.alarms()] == ["rule 'long'"]
 
 
-def test_a_rule_of_the_killing_state_deploys_after_a_kill_that_did_not_help() -> None:
+def test_a_rule_of_the_killing_state_deploys_after_a_kill_that_did_not_help():
     story = flying(rule(SINKS, states=(Stage.KILLING,)))
     story.fly(0.5, vertical_speed=-14.0)
     assert story.fired() == []
@@ -77,7 +77,7 @@ def test_a_rule_of_the_killing_state_deploys_after_a_kill_that_did_not_help() ->
 # -- which goes first ----------------------------------------------------------------------------
 
 
-def test_the_gravest_of_the_fulfilled_goes_first_and_a_deploy_is_one() -> None:
+def test_the_gravest_of_the_fulfilled_goes_first_and_a_deploy_is_one():
     warns = rule(SINKS, action=ALARM, name="warns")
     kills = rule(SINKS, action=K, name="kills")
     deploys = rule(SINKS, action=D, name="deploys")
@@ -88,7 +88,7 @@ def test_the_gravest_of_the_fulfilled_goes_first_and_a_deploy_is_one() -> None:
     assert alarms(story) == 1
 
 
-def test_one_whose_state_is_left_by_a_graver_one_is_not_acted_on() -> None:
+def test_one_whose_state_is_left_by_a_graver_one_is_not_acted_on():
     kills = rule(SINKS, action=K, name="kills")
     warns = rule(SINKS, action=ALARM, states=(Stage.IN_FLIGHT,), name="warns")
     story = flying(warns, kills)
@@ -97,7 +97,7 @@ def test_one_whose_state_is_left_by_a_graver_one_is_not_acted_on() -> None:
     assert alarms(story) == 0
 
 
-def test_of_two_that_want_the_same_the_first_of_the_profile_is_named() -> None:
+def test_of_two_that_want_the_same_the_first_of_the_profile_is_named():
     story = flying(rule(SINKS, name="first"), rule(TILTS, name="second"))
     story.fly(0.3, vertical_speed=-14.0, tilt=90.0)
     kill = story.newest(K)
@@ -118,9 +118,7 @@ def test_of_two_that_want_the_same_the_first_of_the_profile_is_named() -> None:
         (Clears.ON_DISARM, {"armed": Armed.DISARMED, "acceleration": 0.5}, 1),
     ],
 )
-def test_a_rule_is_acted_on_again_once_it_has_cleared(
-    clears: Clears, told: dict[str, Any], acted: int
-) -> None:
+def test_a_rule_is_acted_on_again_once_it_has_cleared(clears, told, acted):
     """Warned of tilt once; then it flies well for 3 s, saying this; then it tilts again."""
     story = flying(rule(TILTS, action=ALARM, hold=0.5, leak=0.5, clears=clears))
     story.fly(1.0, tilt=90.0)
@@ -131,7 +129,7 @@ def test_a_rule_is_acted_on_again_once_it_has_cleared(
     assert ("rule 'tested' has cleared" in story.said()) is (acted == 2)
 
 
-def test_one_that_clears_by_itself_does_not_while_its_counter_leaks() -> None:
+def test_one_that_clears_by_itself_does_not_while_its_counter_leaks():
     story = flying(rule(TILTS, action=ALARM, hold=0.5, leak=0.5, clears=Clears.BY_ITSELF))
     story.fly(1.0, tilt=90.0)
     for _ in range(6):  # swings to and fro
@@ -140,7 +138,7 @@ def test_one_that_clears_by_itself_does_not_while_its_counter_leaks() -> None:
     assert alarms(story) == 1
 
 
-def test_the_core_wakes_to_clear_a_rule_although_nothing_comes() -> None:
+def test_the_core_wakes_to_clear_a_rule_although_nothing_comes():
     silent = rule(
         DeviceCondition(DeviceFact.ASKS_FOR_KILL), action=ALARM, hold=0.0, clears=Clears.BY_ITSELF
     )
@@ -151,7 +149,7 @@ def test_the_core_wakes_to_clear_a_rule_although_nothing_comes() -> None:
     assert "has cleared" in story.said()
 
 
-def test_the_core_wakes_when_what_a_rule_rests_on_is_too_old() -> None:
+def test_the_core_wakes_when_what_a_rule_rests_on_is_too_old():
     story = flying(rule(SINKS, hold=5.0))
     story.fly(0.1, vertical_speed=-14.0)
     deadlines = rule_deadlines(story.config, story.state, START + 0.1)
@@ -163,7 +161,7 @@ def test_the_core_wakes_when_what_a_rule_rests_on_is_too_old() -> None:
     assert not story.state.rule("tested").holds
 
 
-def test_a_silence_of_the_autopilot_wakes_the_core_at_its_limit() -> None:
+def test_a_silence_of_the_autopilot_wakes_the_core_at_its_limit():
     story = flying(rule(AutopilotCondition(AutopilotFact.LOST), action=K))
     story.at(60.0)
     assert story.when(K) == pytest.approx(2.5, abs=1e-5)
@@ -172,7 +170,7 @@ def test_a_silence_of_the_autopilot_wakes_the_core_at_its_limit() -> None:
 # -- modes ---------------------------------------------------------------------------------------
 
 
-def test_in_shadow_the_whole_logic_runs_and_nothing_is_sent() -> None:
+def test_in_shadow_the_whole_logic_runs_and_nothing_is_sent():
     story = Story(with_rules(rule(SINKS, hold=0.3)), mode=i.Mode.SHADOW).flying()
     story.fly(3.0, vertical_speed=-14.0)
     assert story.fired() == ["KILL", "DEPLOY"]
@@ -184,7 +182,7 @@ def test_in_shadow_the_whole_logic_runs_and_nothing_is_sent() -> None:
     assert (story.state.killing.kill, story.state.deploying.deploys) == (None, ())
 
 
-def test_what_was_only_said_in_shadow_is_done_when_active() -> None:
+def test_what_was_only_said_in_shadow_is_done_when_active():
     story = Story(with_rules(rule(SINKS, hold=0.3)), mode=i.Mode.SHADOW).flying()
     story.fly(1.0, vertical_speed=-14.0)
     story.at(1.0, i.ModeRequest(1, i.Mode.ACTIVE, force=True))
@@ -195,7 +193,7 @@ def test_what_was_only_said_in_shadow_is_done_when_active() -> None:
     assert [d.shadow for d in story.decisions() if d.action >= K] == [True, True, False, False]
 
 
-def test_inhibited_a_rule_only_counts() -> None:
+def test_inhibited_a_rule_only_counts():
     story = Story(with_rules(rule(SINKS, hold=0.3)), mode=i.Mode.INHIBITED).flying()
     story.fly(3.0, vertical_speed=-14.0)
     assert story.decisions() == []
@@ -204,7 +202,7 @@ def test_inhibited_a_rule_only_counts() -> None:
 
 
 @pytest.mark.parametrize("follows", [False, True])
-def test_a_rule_of_one_that_is_inhibited_or_follows_is_acted_on_once_it_may(follows: bool) -> None:
+def test_a_rule_of_one_that_is_inhibited_or_follows_is_acted_on_once_it_may(follows):
     story = flying(rule(TILTS, action=ALARM))
     if follows:
         story.follows()
@@ -226,9 +224,7 @@ def test_a_rule_of_one_that_is_inhibited_or_follows_is_acted_on_once_it_may(foll
         ((Outcome.CONFIRMED, Outcome.FAILED), Stage.FAULT),
     ],
 )
-def test_the_mode_is_not_changed_while_something_is_on_its_way_or_was_done(
-    outcomes: tuple[Outcome, ...], stage: Stage
-) -> None:
+def test_the_mode_is_not_changed_while_something_is_on_its_way_or_was_done(outcomes, stage):
     story = flying()
     story.at(0.1, i.DeployRequest(1, False, "it falls"))
     for action, outcome in zip((K, D), outcomes, strict=False):
@@ -238,7 +234,7 @@ def test_the_mode_is_not_changed_while_something_is_on_its_way_or_was_done(
     assert not story.answer(2).success
 
 
-def test_after_a_deploy_only_a_reset_on_the_ground_leads_back() -> None:
+def test_after_a_deploy_only_a_reset_on_the_ground_leads_back():
     story = flying(rule(SINKS))
     story.fly(0.2, vertical_speed=-14.0)
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
@@ -258,7 +254,7 @@ def test_after_a_deploy_only_a_reset_on_the_ground_leads_back() -> None:
     assert story.state.stage is Stage.READY
 
 
-def test_at_rest_the_rules_wake_nobody() -> None:
+def test_at_rest_the_rules_wake_nobody():
     story = flying(rule(SINKS, hold=1.0), rule(TILTS, clears=Clears.BY_ITSELF, action=ALARM))
     story.fly(1.0)
     story.at(1.0, story.report(Action.FLIGHT_BLOCK_RELEASE, Outcome.CONFIRMED))
@@ -292,27 +288,25 @@ def judged(one: Rule, since: float = 2.0, **told: float) -> bool | None:
         ({"tilt": 90.0, "vertical_speed": 0.0}, False),
     ],
 )
-def test_it_cannot_be_said_while_what_is_not_known_could_be_enough(
-    told: dict[str, float], holds: bool | None
-) -> None:
+def test_it_cannot_be_said_while_what_is_not_known_could_be_enough(told, holds):
     assert judged(rule(TILTS, SINKS), **told) is holds
 
 
-def test_what_was_never_known_is_not_waited_for() -> None:
+def test_what_was_never_known_is_not_waited_for():
     story = Story(with_rules(one := rule(TILTS, SINKS)))
     story.at(0.0, vehicle(tilt=90.0))
     assert judge(story.config, story.state, one, START).evidence.holds is False
 
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-9])
-def test_weights_that_miss_by_the_rounding_are_enough(rounding: float) -> None:
+def test_weights_that_miss_by_the_rounding_are_enough(rounding):
     one = rule(replace(TILTS, weight=2.0), needed=2.0 + rounding)
     assert judged(one, tilt=90.0) is True
     assert judged(one) is None
 
 
 @pytest.mark.parametrize(("doubted", "holds"), [(1.0, True), (0.5, False)])
-def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted: float, holds: bool) -> None:
+def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted, holds):
     story = Story(with_rules(one := rule(SINKS, doubted=doubted)))
     story.at(0.0, vehicle(vertical_speed=-14.0))
     assert judge(story.config, story.state, one, START).evidence.holds is True
@@ -331,9 +325,7 @@ def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted: float, holds: 
         (("attitude",), {"vertical_speed": -14.0, "tilt": 5.0}, True),
     ],
 )
-def test_what_is_only_taken_to_be_so_is_in_doubt_with_what_it_stands_beside(
-    disputed: tuple[str, ...], told: dict[str, float], holds: bool
-) -> None:
+def test_what_is_only_taken_to_be_so_is_in_doubt_with_what_it_stands_beside(disputed, told, holds):
     """Given a sink, heights that tell no rate, and one more sign."""
     presumed = MeasurementCondition("climb_rate", below=-6.0, if_unknown=True)
     one = rule(SINKS, presumed, TILTS, needed=1.5, doubted=0.5)
@@ -343,7 +335,7 @@ def test_what_is_only_taken_to_be_so_is_in_doubt_with_what_it_stands_beside(
     assert judge(story.config, state, one, START).evidence.holds is holds
 
 
-def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt() -> None:
+def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt():
     told = MeasurementCondition("climb_rate", below=-6.0, if_unknown=True)
     one = rule(SINKS, told, needed=1.5, doubted=0.5)
     story = Story(with_rules(one))
@@ -355,7 +347,7 @@ def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt() -> None
     assert judged.evidence.holds is True
 
 
-def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:
+def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends():
     story = flying(rule(SINKS, doubted=0.5))
     jumped = {"vertical_speed": Measured(jumped_at=START)}
     state = changed(story.state, measurements=jumped)
@@ -363,7 +355,7 @@ def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:
     assert START + JUMP_DOUBTED + JUST_AFTER in deadlines
 
 
-def test_a_sample_that_is_looked_at_twice_showed_it_once() -> None:
+def test_a_sample_that_is_looked_at_twice_showed_it_once():
     story = Story(with_rules(one := rule(TILTS, SINKS, samples=2, needed=1.0)))
     story.at(0.0, vehicle(tilt=90.0, vertical_speed=0.0))
     for _ in range(3):
@@ -375,7 +367,7 @@ def test_a_sample_that_is_looked_at_twice_showed_it_once() -> None:
 # -- what follows, in words ----------------------------------------------------------------------
 
 
-def test_an_alarm_says_all_its_reasons_once_and_again_behind_its_words() -> None:
+def test_an_alarm_says_all_its_reasons_once_and_again_behind_its_words():
     silent = rule(TILTS, SINKS, action=ALARM, name="falls")
     why = "tilt_deg 90.00 (above 60); vertical_speed -14.00 (below -12)"
     story = flying(silent, replace(silent, name="told", says="it falls"))
@@ -390,9 +382,7 @@ def test_an_alarm_says_all_its_reasons_once_and_again_behind_its_words() -> None
         (math.nan, "it was never seen at the minimum height, 10 m"),
     ],
 )
-def test_a_denial_is_told_with_all_reasons_and_remembered_with_all_its_words(
-    height: float, why: str
-) -> None:
+def test_a_denial_is_told_with_all_reasons_and_remembered_with_all_its_words(height, why):
     story = flying(rule(TILTS, SINKS), profile=LOW)
     story.fly(0.05, tilt=90.0, vertical_speed=-14.0, height=height)
     reasons = "tilt_deg 90.00 (above 60); vertical_speed -14.00 (below -12)"
@@ -400,7 +390,7 @@ def test_a_denial_is_told_with_all_reasons_and_remembered_with_all_its_words(
     assert story.state.rule("tested").denied == why
 
 
-def test_a_denial_that_is_not_said_again_is_remembered_with_the_newest_height() -> None:
+def test_a_denial_that_is_not_said_again_is_remembered_with_the_newest_height():
     story = flying(rule(SINKS), profile=LOW)
     for height in (9.0, 8.0):
         story.fly(story.t + 0.05, vertical_speed=-14.0, height=height)
@@ -412,14 +402,14 @@ def test_a_denial_that_is_not_said_again_is_remembered_with_the_newest_height() 
     assert story.state.rule("tested").denied == "", "it was acted on"
 
 
-def test_the_height_does_not_hide_a_graver_reason_against_a_deploy() -> None:
+def test_the_height_does_not_hide_a_graver_reason_against_a_deploy():
     story = flying(rule(TILTS), profile=LOW)
     story.fly(0.05, tilt=90.0, height=9.0, armed=Armed.DISARMED)
     why = "the motors are disarmed, and nothing says that it falls"
     assert story.state.rule("tested").denied == why
 
 
-def test_a_rule_of_another_state_does_not_hide_the_next() -> None:
+def test_a_rule_of_another_state_does_not_hide_the_next():
     grounded = rule(TILTS, states=(Stage.READY,), name="grounded")
     off = rule(AutopilotCondition(AutopilotFact.DISARMED), action=K, hold=0.7, name="off")
     story = flying(grounded, off)
@@ -430,7 +420,7 @@ def test_a_rule_of_another_state_does_not_hide_the_next() -> None:
     assert story.when(K) == pytest.approx(0.8, abs=1e-5)
 
 
-def test_no_sample_of_a_measurement_is_awaited_where_one_word_is_enough() -> None:
+def test_no_sample_of_a_measurement_is_awaited_where_one_word_is_enough():
     off = AutopilotCondition(AutopilotFact.DISARMED)
     story = flying(rule(off, TILTS, action=K, needed=1.0, hold=0.2, samples=2))
     story.fly(1.0, armed=Armed.DISARMED, tilt=math.nan)
@@ -445,9 +435,7 @@ def test_no_sample_of_a_measurement_is_awaited_where_one_word_is_enough() -> Non
 
 
 @pytest.mark.parametrize(("clears", "alarms"), [(Clears.NEVER, 1), (Clears.BY_ITSELF, 2)])
-def test_after_a_bounce_only_one_that_never_clears_is_still_done_with(
-    clears: Clears, alarms: int
-) -> None:
+def test_after_a_bounce_only_one_that_never_clears_is_still_done_with(clears, alarms):
     story = flying(rule(TILTS, action=ALARM, states=(Stage.IN_FLIGHT,), clears=clears))
     story.fly(0.2, tilt=90.0)
     story.fly(0.4, tilt=90.0, landed_state=LandedState.ON_GROUND)
@@ -457,7 +445,7 @@ def test_after_a_bounce_only_one_that_never_clears_is_still_done_with(
     assert len(story.alarms()) == alarms
 
 
-def test_one_that_was_acted_on_keeps_its_counter_and_clears_once_that_has_leaked() -> None:
+def test_one_that_was_acted_on_keeps_its_counter_and_clears_once_that_has_leaked():
     story = flying(rule(TILTS, action=ALARM, hold=0.5, leak=0.5, clears=Clears.BY_ITSELF))
     while not story.alarms():
         story.fly(story.t + 0.05, tilt=90.0)

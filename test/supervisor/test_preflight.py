@@ -75,7 +75,7 @@ def after_hearing(*devices: ParachuteStatus) -> tuple[str, ...]:
     return block_reasons(story.config, story.state, START)
 
 
-def test_a_step_for_a_device_that_is_not_there_blocks_flight() -> None:
+def test_a_step_for_a_device_that_is_not_there_blocks_flight():
     """It would stop the motors and release nothing."""
     step = "deploy_ladder names mavlink_parachute:1/162, which"
     second = replace(GOOD, device="1/162")
@@ -85,7 +85,7 @@ def test_a_step_for_a_device_that_is_not_there_blocks_flight() -> None:
     assert after_hearing(GOOD, second) == ()
 
 
-def test_a_step_on_a_link_that_may_be_missing_blocks_nothing_while_it_is() -> None:
+def test_a_step_on_a_link_that_may_be_missing_blocks_nothing_while_it_is():
     other = "upf_can"
     ladder = (Rung(LINK), Rung(other, "34"))
     config = SupervisorConfig(deploy_links=(LINK, other), deploy_ladder=ladder)
@@ -108,7 +108,7 @@ def with_device(limits: PreflightLimits = STRICT, **changes: Any) -> Story:
     return story
 
 
-def test_when_all_is_well_it_arms() -> None:
+def test_when_all_is_well_it_arms():
     story = standing()
     assert reasons(story) == ()
     outputs = story.at(0.1, i.ArmRequest(1, True, 0, TODAY))
@@ -138,13 +138,13 @@ def test_when_all_is_well_it_arms() -> None:
         ({"backup_voltage": 3.49}, "backup voltage 3.49 V (need 3.5 V)"),
     ],
 )
-def test_what_is_wrong_with_a_device_is_said_in_words(changes: dict[str, Any], words: str) -> None:
+def test_what_is_wrong_with_a_device_is_said_in_words(changes, words):
     told = reasons(with_device(**changes))
     assert len(told) == 1
     assert told[0].startswith(f"{LINK} 1/161: {words}")
 
 
-def test_one_that_is_released_is_and_was() -> None:
+def test_one_that_is_released_is_and_was():
     assert reasons(with_device(deployed=True)) == (
         f"{LINK} 1/161 was released: repack or replace it, then call safety/reset",
         "the vehicle is BLOCKED (need READY)",
@@ -164,7 +164,7 @@ def test_one_that_is_released_is_and_was() -> None:
         {"backup_voltage": math.nan},  # it does not say
     ],
 )
-def test_what_is_just_right_is_nothing_against_it(changes: dict[str, Any]) -> None:
+def test_what_is_just_right_is_nothing_against_it(changes):
     assert reasons(with_device(**changes)) == ()
 
 
@@ -178,20 +178,20 @@ def test_what_is_just_right_is_nothing_against_it(changes: dict[str, Any]) -> No
         ({"min_backup_voltage": 0.0}, {"backup_voltage": 0.0}),
     ],
 )
-def test_each_check_can_be_left_out(limits: dict[str, Any], changes: dict[str, Any]) -> None:
+def test_each_check_can_be_left_out(limits, changes):
     assert reasons(with_device(replace(STRICT, **limits), **changes)) == ()
 
 
-def test_where_today_is_not_known_the_age_of_the_pack_is_not_held_against_it() -> None:
+def test_where_today_is_not_known_the_age_of_the_pack_is_not_held_against_it():
     assert reasons(with_device(packed_date="1999-01-01"), day=-1) == ()
 
 
-def test_flags_in_which_its_node_finds_no_fault_are_not_held_against_it() -> None:
+def test_flags_in_which_its_node_finds_no_fault_are_not_held_against_it():
     """Given a parachute of which a flag does not apply (ignored_error_flags of its node)."""
     assert reasons(with_device(error_flags=ErrorFlags.LOW_POWER, faults=())) == ()
 
 
-def test_a_device_that_is_lost_is_told_of_by_its_link_not_by_its_last_words() -> None:
+def test_a_device_that_is_lost_is_told_of_by_its_link_not_by_its_last_words():
     broken = {"error_flags": ErrorFlags.LOW_POWER, "faults": ("LOW_POWER",)}
     story = with_device(**broken, link_state=LinkState.LOST)
     assert reasons(story) == ()
@@ -204,17 +204,17 @@ def test_a_device_that_is_lost_is_told_of_by_its_link_not_by_its_last_words() ->
         ({"battery_voltage": 20.9}, "battery_voltage 20.90 V (need 21 V)"),
     ],
 )
-def test_an_empty_battery_is_said_with_its_limit(told: dict[str, float], words: str) -> None:
+def test_an_empty_battery_is_said_with_its_limit(told, words):
     assert reasons(standing(**told)) == (words,)
 
 
-def test_a_full_battery_and_one_that_is_not_told_are_nothing_against_it() -> None:
+def test_a_full_battery_and_one_that_is_not_told_are_nothing_against_it():
     assert reasons(standing(battery_remaining=0.3, battery_voltage=21.0)) == ()
     assert reasons(standing(battery_age=math.nan)) == ()
 
 
 @pytest.mark.parametrize("difference", [0.26, -0.26])
-def test_a_clock_that_differs_is_said_with_its_limit(difference: float) -> None:
+def test_a_clock_that_differs_is_said_with_its_limit(difference):
     story = standing()
     beat = i.LinkHeartbeat(LINK, LinkState.OK, True, 9, clock_difference=difference)
     story.at(0.1, beat)
@@ -223,13 +223,13 @@ def test_a_clock_that_differs_is_said_with_its_limit(difference: float) -> None:
     assert reasons(story) == ()
 
 
-def test_a_vehicle_that_moves_is_not_armed() -> None:
+def test_a_vehicle_that_moves_is_not_armed():
     story = standing(vertical_speed=-3.0, vertical_speed_age=0.0)
     (told,) = reasons(story)
     assert told == "the vehicle moves: vertical_speed -3.0 m/s (nothing on the ground beyond 2)"
 
 
-def test_every_reason_is_told_at_once() -> None:
+def test_every_reason_is_told_at_once():
     broken = {"error_flags": ErrorFlags.GPS_ERROR, "faults": ("GPS_ERROR",)}
     story = with_device(state=ParachuteState.ABNORMAL, **broken)
     story.at(0.1, i.ModeRequest(1, i.Mode.SHADOW, force=False), story.heartbeat(healthy=False))
@@ -262,7 +262,7 @@ LOW = rule(
 )
 
 
-def test_a_rule_may_block_flight_at_once_and_releases_it_by_itself() -> None:
+def test_a_rule_may_block_flight_at_once_and_releases_it_by_itself():
     story = Story(with_rules(LOW)).ready()
     outputs = story.at(0.1, vehicle(**DOWN, battery_voltage=21.0))
     assert story.state.stage is Stage.BLOCKED
@@ -274,14 +274,14 @@ def test_a_rule_may_block_flight_at_once_and_releases_it_by_itself() -> None:
     assert "rule 'low battery' has cleared" in story.said()
 
 
-def test_a_rule_without_words_blocks_all_the_same() -> None:
+def test_a_rule_without_words_blocks_all_the_same():
     story = Story(with_rules(replace(LOW, says=""))).ready()
     story.at(0.1, vehicle(**DOWN, battery_voltage=21.0))
     told = block_reasons(story.config, story.state, START + story.t)
     assert told == ("rule 'low battery': fulfilled",)
 
 
-def test_a_rule_of_another_action_blocks_nothing() -> None:
+def test_a_rule_of_another_action_blocks_nothing():
     broken = rule(DeviceCondition(DeviceFact.ABNORMAL), action=Action.NONE, states=(Stage.READY,))
     story = Story(with_rules(broken)).ready()
     abnormal = replace(GOOD, state=ParachuteState.ABNORMAL)
@@ -290,7 +290,7 @@ def test_a_rule_of_another_action_blocks_nothing() -> None:
     assert len(story.alarms()) == 1
 
 
-def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen() -> None:
+def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen():
     story = Story(shipped("multirotor")).ready()
     # Given that an autopilot was asked for them, when they had time to come, not sooner.
     story.fly(4.8, **DOWN)
@@ -305,7 +305,7 @@ def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen() -> None:
     assert [("no pressure" in text) for text in said] == [True, False]
 
 
-def test_of_a_vehicle_that_tells_all_nothing_is_said_to_be_not_seen() -> None:
+def test_of_a_vehicle_that_tells_all_nothing_is_said_to_be_not_seen():
     story = Story(shipped("multirotor")).ready()
     all_of_it = {"pressure": 101_325.0, "attitude_error": 1.0, "target_vertical_speed": 0.0}
     story.fly(8.0, **DOWN, **all_of_it)
@@ -315,7 +315,7 @@ def test_of_a_vehicle_that_tells_all_nothing_is_said_to_be_not_seen() -> None:
 @pytest.mark.parametrize(
     ("status", "name"), [(5, "CRITICAL"), (6, "EMERGENCY"), (8, "TERMINATION")]
 )
-def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status: int, name: str) -> None:
+def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status, name):
     story = Story(shipped("multirotor")).ready()
     story.at(0.2, story.heartbeat(), story.told(**DOWN, height=0.0, system_status=status))
     assert story.state.stage is Stage.BLOCKED
@@ -339,9 +339,7 @@ def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status: int, name: st
         (Airframe.ANY, 1, ""),
     ],
 )
-def test_a_profile_of_another_kind_of_vehicle_forbids_the_take_off(
-    vehicle: Airframe, mav_type: int, told: str
-) -> None:
+def test_a_profile_of_another_kind_of_vehicle_forbids_the_take_off(vehicle, mav_type, told):
     """The shipped default is multirotor: an aeroplane flown with it would be ended in a dive, and
     its spins not seen."""
     config = SupervisorConfig(profile=replace(SupervisorConfig().profile, vehicle=vehicle))
@@ -355,7 +353,7 @@ def test_a_profile_of_another_kind_of_vehicle_forbids_the_take_off(
     assert [one for one in reasons if "MAV_TYPE" in one] == ([expected] if told else [])
 
 
-def test_what_the_vehicle_says_against_flying_is_a_reason_and_in_flight_an_alarm() -> None:
+def test_what_the_vehicle_says_against_flying_is_a_reason_and_in_flight_an_alarm():
     slow = ("ATTITUDE comes at 2.1 Hz (need 5 Hz)",)
     story = Story(shipped("multirotor")).ready()
     story.at(0.2, story.heartbeat(), story.told(**DOWN, height=0.0, faults=slow))
@@ -364,7 +362,7 @@ def test_what_the_vehicle_says_against_flying_is_a_reason_and_in_flight_an_alarm
     assert [one for one in aloft.alarms() if slow[0] in one] == [f"vehicle: {slow[0]}"]
 
 
-def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed() -> None:
+def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed():
     story = Story(shipped("multirotor")).ready()
     story.at(0.0, i.ArmRequest(1, True, 0))
     story.at(0.1, i.ArmDone(1, True, True, "armed"))
@@ -378,7 +376,7 @@ def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed() -> None:
 
 
 @pytest.mark.parametrize("armed", [True, False])
-def test_so_are_those_that_somebody_else_has_armed_on_the_ground(armed: bool) -> None:
+def test_so_are_those_that_somebody_else_has_armed_on_the_ground(armed):
     """By ~/arm, from a ground station, or before a restart of the supervisor."""
     story = Story(shipped("multirotor")).ready()
     status = replace(GOOD, state=ParachuteState.ARMED, armed=True) if armed else GOOD
@@ -391,7 +389,7 @@ def test_so_are_those_that_somebody_else_has_armed_on_the_ground(armed: bool) ->
     assert [(one.token, one.arm) for one in orders] == ([(0, False)] if armed else [])
 
 
-def test_in_flight_a_fault_whose_figure_changes_is_one_alarm_and_another_fault_another() -> None:
+def test_in_flight_a_fault_whose_figure_changes_is_one_alarm_and_another_fault_another():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     for tenths in range(6, 30):
         late = f"answers after {tenths / 10:.1f} s (limit 0.5 s): it is late"
@@ -437,15 +435,13 @@ def known(vehicle_received: float = NOW, **links: LinkEvidence) -> State:
         (("hot", "wet"), True, " (1 hot; 1 wet; 1 is released)"),
     ],
 )
-def test_an_unhealthy_device_is_told_with_its_faults_if_it_has_any(
-    faults: tuple[str, ...], deployed: bool, more: str
-) -> None:
+def test_an_unhealthy_device_is_told_with_its_faults_if_it_has_any(faults, deployed, more):
     device = replace(READY, faults=faults, deployed=deployed)
     state = known(a=link(device, healthy=False))
     assert block_reasons(CONFIG, state, NOW) == (f"a: its device is not healthy{more}",)
 
 
-def test_what_its_node_repeats_of_a_release_is_told_once_and_all_else_of_it() -> None:
+def test_what_its_node_repeats_of_a_release_is_told_once_and_all_else_of_it():
     device = replace(READY, faults=("hot",), deployed=True)
     more = ("1 is released", "supply 3.1 V", "supply 3.2 V")
     evidence = replace(link(device, healthy=False), reasons=more)
@@ -461,14 +457,12 @@ def test_what_its_node_repeats_of_a_release_is_told_once_and_all_else_of_it() ->
         (LinkState.LOST, "a: its device is LOST (1 hot)"),
     ],
 )
-def test_a_node_that_does_not_hear_its_device_is_told_of_by_the_device(
-    told: LinkState, words: str
-) -> None:
+def test_a_node_that_does_not_hear_its_device_is_told_of_by_the_device(told, words):
     state = known(a=link(replace(READY, faults=("hot",)), state=told))
     assert block_reasons(CONFIG, state, NOW) == (words,)
 
 
-def test_each_link_is_told_by_its_own_limits() -> None:
+def test_each_link_is_told_by_its_own_limits():
     patient = MappingProxyType({"a": LinkLimits(stale_after=2.0, lost_after=4.0)})
     config = replace(CONFIG, link_limits=patient)
     silent = known(a=replace(link(), heard=NOW - 1.75))
@@ -480,13 +474,13 @@ def test_each_link_is_told_by_its_own_limits() -> None:
 
 
 @pytest.mark.parametrize("stage", [Stage.KILLING, Stage.DEPLOYED, Stage.FAULT])
-def test_after_a_kill_or_a_deploy_only_a_reset_unblocks(stage: Stage) -> None:
+def test_after_a_kill_or_a_deploy_only_a_reset_unblocks(stage):
     state = replace(known(a=link()), stage=stage)
     words = f"the vehicle is {stage.name}: needs a reset on the ground"
     assert block_reasons(CONFIG, state, NOW) == (words,)
 
 
-def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None:
+def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link():
     config = SupervisorConfig(required_links=("a",), kill_links=("b",), deploy_links=("c",))
     assert block_reasons(config, known(c=link()), NOW) == (
         "a: nothing received from its node",
@@ -495,7 +489,7 @@ def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None
     assert block_reasons(config, known(a=link(), b=link(), c=link()), NOW) == ()
 
 
-def test_a_vehicle_that_never_told_of_its_motors_blocks_flight() -> None:
+def test_a_vehicle_that_never_told_of_its_motors_blocks_flight():
     state = changed(known(a=link()), vehicle=VehicleState())
     assert block_reasons(CONFIG, state, NOW) == (
         "vehicle/state: armed or disarmed was never reported",
@@ -506,9 +500,7 @@ def test_a_vehicle_that_never_told_of_its_motors_blocks_flight() -> None:
     ("age", "told"),
     [(2.5, ()), (2.75, ("vehicle/state: armed or not is 2.8 s old (limit 2.5 s)",))],
 )
-def test_what_the_vehicle_says_of_its_motors_counts_up_to_its_age(
-    age: float, told: tuple[str, ...]
-) -> None:
+def test_what_the_vehicle_says_of_its_motors_counts_up_to_its_age(age, told):
     assert block_reasons(CONFIG, known(NOW - age, a=link()), NOW) == told
 
 
@@ -519,20 +511,18 @@ def test_what_the_vehicle_says_of_its_motors_counts_up_to_its_age(
         ("2024-01-01", ()),
     ],
 )
-def test_a_wall_clock_may_say_the_first_day_and_none_before(
-    today: str, told: tuple[str, ...]
-) -> None:
+def test_a_wall_clock_may_say_the_first_day_and_none_before(today, told):
     assert arm_reasons(CONFIG, known(a=link()), day(today), NOW) == told
 
 
-def test_a_wall_clock_that_was_never_set_makes_a_pack_look_like_one_from_the_future() -> None:
+def test_a_wall_clock_that_was_never_set_makes_a_pack_look_like_one_from_the_future():
     assert arm_reasons(CONFIG, known(a=link(READY)), 0, NOW) == (
         "the wall clock shows 1970-01-01 (need 2024-01-01 or later)",
         "a 1: packed on 2026-06-01, 20605 days from now",
     )
 
 
-def test_a_pack_may_be_allowed_a_single_day() -> None:
+def test_a_pack_may_be_allowed_a_single_day():
     config = replace(CONFIG, preflight=PreflightLimits(max_pack_age=1))
     state = known(a=link(READY))
     assert arm_reasons(config, state, day("2026-06-02"), NOW) == ()
@@ -541,7 +531,7 @@ def test_a_pack_may_be_allowed_a_single_day() -> None:
     )
 
 
-def test_a_fault_that_its_node_repeats_is_one_with_its_age_of_now() -> None:
+def test_a_fault_that_its_node_repeats_is_one_with_its_age_of_now():
     story = Story().ready()
     lost = ("heartbeat LOST: 7.6 s old",)
     beat = story.heartbeat(healthy=False, state=LinkState.LOST)

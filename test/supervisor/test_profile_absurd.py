@@ -25,7 +25,7 @@ def told_of(*conditions: str, **lines: str) -> list[str]:
         ("08.5", "8.5"),
     ],
 )
-def test_a_number_that_yaml_reads_as_another_is_refused(written: str, meant: str) -> None:
+def test_a_number_that_yaml_reads_as_another_is_refused(written, meant):
     (told,) = mistakes(WHOLE.replace("minimum_height: 12", f"minimum_height: {written}"))
     assert told == (
         f"mine.yaml, line 2: minimum_height is {written}, which YAML reads as {meant}: "
@@ -34,7 +34,7 @@ def test_a_number_that_yaml_reads_as_another_is_refused(written: str, meant: str
 
 
 @pytest.mark.parametrize("written", [".5e3", "1e3", "5e-1", "08", "0o17"])
-def test_a_number_that_yaml_takes_for_text_is_refused_with_the_fix(written: str) -> None:
+def test_a_number_that_yaml_takes_for_text_is_refused_with_the_fix(written):
     (told,) = mistakes(WHOLE.replace("minimum_height: 12", f"minimum_height: {written}"))
     assert told == (
         f"mine.yaml, line 2: minimum_height is {written}, which YAML reads as text: "
@@ -43,13 +43,13 @@ def test_a_number_that_yaml_takes_for_text_is_refused_with_the_fix(written: str)
 
 
 @pytest.mark.parametrize("written", ["12", "12.", "+12", "12.0", "1.2e+1"])
-def test_a_number_that_all_read_alike_is_that_number(written: str) -> None:
+def test_a_number_that_all_read_alike_is_that_number(written):
     text = WHOLE.replace("minimum_height: 12", f"minimum_height: {written}")
     assert read(text).minimum_height == 12.0
 
 
 @pytest.mark.parametrize(("word", "meant"), [("yes", "true"), ("Off", "false"), ("NO", "false")])
-def test_a_truth_is_true_or_false_and_no_other_word(word: str, meant: str) -> None:
+def test_a_truth_is_true_or_false_and_no_other_word(word, meant):
     (told,) = told_of(f"measurement: tilt_deg, above: 60, if_unknown: {word}")
     assert told == (
         f"mine.yaml, line 7: if_unknown of tilt_deg in rule 'a' is {word}, which YAML reads as "
@@ -57,14 +57,14 @@ def test_a_truth_is_true_or_false_and_no_other_word(word: str, meant: str) -> No
     )
 
 
-def test_a_number_in_a_rule_is_looked_at_as_well() -> None:
+def test_a_number_in_a_rule_is_looked_at_as_well():
     (told,) = told_of("measurement: tilt_deg, above: 1:00")
     assert "line 7: above of tilt_deg in rule 'a' is 1:00, which YAML reads as 60" in told
     (told,) = told_of("autopilot: lost", **{"for": "0x1"})
     assert "line 8: for of rule 'a' is 0x1, which YAML reads as 1" in told
 
 
-def test_a_profile_without_any_rule_is_refused() -> None:
+def test_a_profile_without_any_rule_is_refused():
     (told,) = mistakes("profile: p\nrules: {}\n")
     assert told == (
         "mine.yaml, line 2: rules is empty: need at least one; "
@@ -88,18 +88,18 @@ def test_a_profile_without_any_rule_is_refused() -> None:
         ),
     ],
 )
-def test_a_limit_beyond_what_can_be_measured_is_refused(condition: str, problem: str) -> None:
+def test_a_limit_beyond_what_can_be_measured_is_refused(condition, problem):
     name = condition.split()[1].rstrip(",")
     assert told_of(condition) == [f"mine.yaml, line 7: {name} in rule 'a' {problem}"]
 
 
-def test_what_can_be_measured_is_what_the_profile_says() -> None:
+def test_what_can_be_measured_is_what_the_profile_says():
     text = RULE.replace("rules:", "measurements: {height: {maximum: 90000}}\nrules:")
     assert read(f"{text}      - {{measurement: height, above: 60000}}\n").rules
     assert told_of("measurement: height, above: 60000")
 
 
-def test_limits_that_cannot_hold_together_are_refused() -> None:
+def test_limits_that_cannot_hold_together_are_refused():
     """A tilt over 60 and one under 30 degrees: the rule would be there and never act."""
     both = ("measurement: tilt_deg, above: 60", "measurement: tilt_deg, below: 30")
     (told,) = told_of(*both)
@@ -110,21 +110,21 @@ def test_limits_that_cannot_hold_together_are_refused() -> None:
     assert read(alarm + f"      - {{{both[0]}}}\n      - {{{both[1]}}}\n    needed: 1\n").rules
 
 
-def test_limits_of_which_one_always_holds_are_refused() -> None:
+def test_limits_of_which_one_always_holds_are_refused():
     both = ("measurement: tilt_deg, above: 30", "measurement: tilt_deg, below: 60")
     (told,) = told_of(*both, needed="1")
     assert told == "mine.yaml, line 3: rule 'a' always holds: its limits leave no value out"
 
 
 @pytest.mark.parametrize("action", ["KILL", "DEPLOY"])
-def test_what_ends_a_flight_waits_for_a_minute_at_most_and_an_alarm_for_ten(action: str) -> None:
+def test_what_ends_a_flight_waits_for_a_minute_at_most_and_an_alarm_for_ten(action):
     alarm = RULE.replace("KILL", "ALARM") + "      - {autopilot: rebooted}\n"
     assert read(f"{alarm}    for: 600\n").rules[0].hold == 600.0
     (told,) = mistakes(alarm.replace("ALARM", action) + "    for: 3600\n")
     assert told == "mine.yaml, line 8: for of rule 'a' is 3600: need 0 to 60"
 
 
-def test_a_counter_that_ends_a_flight_forgets() -> None:
+def test_a_counter_that_ends_a_flight_forgets():
     """Without a leak, one second of a whole season would add up to a kill."""
     (told,) = told_of("autopilot: rebooted", leak="0", **{"for": "1"})
     assert told == "mine.yaml, line 8: leak of rule 'a' is 0: need 0.01 to 100"
@@ -140,14 +140,12 @@ def test_a_counter_that_ends_a_flight_forgets() -> None:
         ("height: {stuck_after: 3600}", "stuck_after of height is 3600: need 0 to 600"),
     ],
 )
-def test_limits_of_a_measurement_that_would_let_anything_pass_are_refused(
-    given: str, need: str
-) -> None:
+def test_limits_of_a_measurement_that_would_let_anything_pass_are_refused(given, need):
     text = WHOLE.replace("height: {maximum: 9000, jump: 20.0}", given)
     assert mistakes(text) == [f"mine.yaml, line 7: {need}"]
 
 
 @pytest.mark.parametrize("given", ["minimum_height: 1.0e+6", "low_height: 5000.0"])
-def test_a_height_below_which_nothing_would_ever_open_is_refused(given: str) -> None:
+def test_a_height_below_which_nothing_would_ever_open_is_refused(given):
     (told,) = mistakes(WHOLE.replace("minimum_height: 12", given))
     assert told.endswith("need 0 to 1000")

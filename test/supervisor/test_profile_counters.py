@@ -1,7 +1,5 @@
 """What the counters of the shipped rules forget, and what they do not: flights, not values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import cycle
 from typing import Any
@@ -44,9 +42,7 @@ def tells(tilts: tuple[float, ...], sink: float) -> Callable[[int], dict[str, An
 
 
 @pytest.mark.parametrize(("profile", "tilt", "sink"), TIPS)
-def test_two_wrong_attitudes_in_a_descent_end_no_flight(
-    profile: str, tilt: float, sink: float
-) -> None:
+def test_two_wrong_attitudes_in_a_descent_end_no_flight(profile, tilt, sink):
     """At the fewest messages that are enough, two of them last as long as the rule waits."""
     story = descending(profile, sink)
     every = 0.4 if profile == "fixed_wing" else FIVE_HERTZ
@@ -57,8 +53,8 @@ def test_two_wrong_attitudes_in_a_descent_end_no_flight(
 
 @pytest.mark.parametrize(("profile", "tilt", "sink"), TIPS)
 def test_a_vehicle_that_tumbles_and_is_upright_now_and_again_is_deployed_all_the_same(
-    profile: str, tilt: float, sink: float
-) -> None:
+    profile, tilt, sink
+):
     """Half of the time it is. What forgot as fast as it counted would never decide."""
     story = descending(profile, sink)
     fell_at = story.t
@@ -70,8 +66,8 @@ def test_a_vehicle_that_tumbles_and_is_upright_now_and_again_is_deployed_all_the
 
 @pytest.mark.parametrize(("profile", "tilt", "sink"), TIPS)
 def test_an_attitude_that_is_wrong_one_time_in_ten_ends_no_flight_however_long(
-    profile: str, tilt: float, sink: float
-) -> None:
+    profile, tilt, sink
+):
     """What never forgot would have it together within seconds."""
     story = descending(profile, sink)
     story.height = 500.0  # type: ignore[attr-defined]
@@ -87,7 +83,7 @@ def weightless(low: int, carried: int) -> Callable[[int], dict[str, Any]]:
 
 
 @pytest.mark.parametrize("lasts", [0.8, 1.3])
-def test_an_aeroplane_that_is_pushed_over_to_no_weight_is_not_ended(lasts: float) -> None:
+def test_an_aeroplane_that_is_pushed_over_to_no_weight_is_not_ended(lasts):
     """Given ArduPlane, which tells no commanded speed, and a pilot's parabola."""
     story = descending("fixed_wing", 0.0)
     start = story.t
@@ -98,14 +94,14 @@ def test_an_aeroplane_that_is_pushed_over_to_no_weight_is_not_ended(lasts: float
     assert story.fired() == []
 
 
-def test_an_aeroplane_that_is_thrown_about_in_a_descent_is_not_ended() -> None:
+def test_an_aeroplane_that_is_thrown_about_in_a_descent_is_not_ended():
     """Pushed over and carried again, each for 0.3 s: nothing of it may be left at the next."""
     story = descending("fixed_wing", 4.6)
     fly(story, 12.0, TWENTY_HERTZ, weightless(6, 6))
     assert story.fired() == []
 
 
-def test_an_aeroplane_that_falls_is_deployed_though_it_is_carried_now_and_again() -> None:
+def test_an_aeroplane_that_falls_is_deployed_though_it_is_carried_now_and_again():
     """One sample of four: a fall that swings."""
     story = descending("fixed_wing", 4.6)
     fly(story, 1.5, TWENTY_HERTZ, weightless(3, 1))

@@ -92,11 +92,11 @@ def wrong(text: str) -> str:
 
 
 @pytest.mark.parametrize(("line", "low"), [("", 0.0), ("low_height: 35.5\n", 35.5)])
-def test_a_low_height_is_read_and_nothing_is_low_without_one(line: str, low: float) -> None:
+def test_a_low_height_is_read_and_nothing_is_low_without_one(line, low):
     assert read(WHOLE.replace("moving_speed", f"{line}moving_speed")).low_height == low
 
 
-def test_what_is_written_is_what_is_read() -> None:
+def test_what_is_written_is_what_is_read():
     profile = read(WHOLE)
     assert profile.name == "mine"
     assert profile.minimum_height == 12.0
@@ -116,7 +116,7 @@ def test_what_is_written_is_what_is_read() -> None:
     assert silent.clears is Clears.NEVER
 
 
-def test_a_condition_may_go_on_until_another_limit() -> None:
+def test_a_condition_may_go_on_until_another_limit():
     one = read(WHOLE.replace("below: -12.5", "below: -12.5, until: -3")).rules[0].conditions[0]
     assert isinstance(one, MeasurementCondition)
     assert one.until == -3.0
@@ -131,7 +131,7 @@ def test_a_condition_may_go_on_until_another_limit() -> None:
     assert not MeasurementCondition("tilt_deg", below=3.0).lingers(2.0)
 
 
-def test_without_needed_all_conditions_must_hold() -> None:
+def test_without_needed_all_conditions_must_hold():
     assert read(WHOLE.replace("    needed: 3\n", "")).rules[0].needed == pytest.approx(5.5)
 
 
@@ -172,26 +172,24 @@ def test_without_needed_all_conditions_must_hold() -> None:
         ("clears: on_disarm", "clears: ondisarm", 25, "(did you mean on_disarm?)"),
     ],
 )
-def test_each_mistake_is_told_with_its_line_and_the_fix(
-    old: str, new: str, line: int, words: str
-) -> None:
+def test_each_mistake_is_told_with_its_line_and_the_fix(old, new, line, words):
     assert WHOLE.count(old) >= 1
     told = mistakes(WHOLE.replace(old, new, 1))
     at = [one for one in told if one.startswith(f"mine.yaml, line {line}: ")]
     assert any(words in one for one in at), told
 
 
-def test_a_deploy_without_states_is_told_only_that() -> None:
+def test_a_deploy_without_states_is_told_only_that():
     told = mistakes(WHOLE.replace("    states: [IN_FLIGHT, KILLING]\n", ""))
     assert told == ["mine.yaml, line 9: rule 'falls' has no states: add it"]
 
 
-def test_a_rule_without_conditions_is_told_only_that() -> None:
+def test_a_rule_without_conditions_is_told_only_that():
     text = "profile: p\nrules:\n  a:\n    states: READY\n    action: DEPLOY\n    needed: 2\n"
     assert mistakes(text) == ["mine.yaml, line 3: rule 'a' has no conditions: add it"]
 
 
-def test_every_mistake_is_told_at_once() -> None:
+def test_every_mistake_is_told_at_once():
     text = WHOLE.replace("12.5", "fast").replace("leak: 0.25", "leak: x").replace("DEPLOY", "D")
     told = mistakes(text)
     assert [one.split(":")[0] for one in told] == [
@@ -220,12 +218,12 @@ def test_every_mistake_is_told_at_once() -> None:
         ("? [a]\n: 1\n", "line 1: a key of a profile is no word"),
     ],
 )
-def test_what_is_no_profile_at_all_says_so(text: str, words: str) -> None:
+def test_what_is_no_profile_at_all_says_so(text, words):
     assert any(words in one for one in mistakes(text))
 
 
 @given(st.text(max_size=200))
-def test_no_text_raises_anything_else(text: str) -> None:
+def test_no_text_raises_anything_else(text):
     with pytest.raises(ProfileError):
         read(text)
 
@@ -241,9 +239,7 @@ LINES = WHOLE.splitlines()
         st.text(max_size=30),
     ),
 )
-def test_a_line_that_is_spoilt_is_a_profile_all_the_same_or_a_mistake_with_a_line(
-    number: int, instead: str
-) -> None:
+def test_a_line_that_is_spoilt_is_a_profile_all_the_same_or_a_mistake_with_a_line(number, instead):
     text = "\n".join([*LINES[:number], instead, *LINES[number + 1 :]])
     assert wrong(text).startswith(("mine.yaml, line ", "nothing"))
 
@@ -252,12 +248,12 @@ def test_a_line_that_is_spoilt_is_a_profile_all_the_same_or_a_mistake_with_a_lin
     st.sampled_from([w for w in WHOLE.replace("\n", " ").split(" ") if w and w[0] not in "{[-"]),
     st.sampled_from([".inf", "-.inf", "1e400", "0x_", "2024-99-99", "~", "!!int x", "=", "<<"]),
 )
-def test_a_value_that_is_no_value_raises_nothing_else(word: str, value: str) -> None:
+def test_a_value_that_is_no_value_raises_nothing_else(word, value):
     assert wrong(WHOLE.replace(word, value, 1)).startswith(("mine.yaml, line ", "nothing"))
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing", "rocket"])
-def test_each_shipped_profile_has_no_mistake_and_says_what_and_wherefrom(name: str) -> None:
+def test_each_shipped_profile_has_no_mistake_and_says_what_and_wherefrom(name):
     text = (PROFILES / f"{name}.yaml").read_text(encoding="utf-8")
     profile = read(text)
     assert profile.name == name
@@ -267,7 +263,7 @@ def test_each_shipped_profile_has_no_mistake_and_says_what_and_wherefrom(name: s
 
 
 @pytest.mark.parametrize("name", ['""', '"  "'])
-def test_a_rule_has_a_name(name: str) -> None:
+def test_a_rule_has_a_name(name):
     """Decisions are known by it: one without would kill, and never deploy."""
     (told,) = mistakes(WHOLE.replace("  falls:", f"  {name}:", 1))
     assert "a rule has no name, by which its decisions are known: name it" in told
@@ -283,7 +279,7 @@ def test_a_rule_has_a_name(name: str) -> None:
         ("height, above: -499", "height 30"),
     ],
 )
-def test_a_rule_that_holds_in_a_hover_ends_no_flight(limit: str, told: str) -> None:
+def test_a_rule_that_holds_in_a_hover_ends_no_flight(limit, told):
     text = ALWAYS_TRUE.format(limit, "DEPLOY")
     (wrong,) = mistakes(text)
     assert wrong.endswith(
@@ -303,14 +299,14 @@ rules:
 
 
 @pytest.mark.parametrize("key", ["max_age", "rate", "jump"])
-def test_a_limit_that_no_measurement_keeps_is_refused(key: str) -> None:
+def test_a_limit_that_no_measurement_keeps_is_refused(key):
     """Each change would be a jump, each word too old."""
     text = WHOLE.replace("{maximum: 9000, jump: 20.0}", f"{{{key}: 0.0001}}")
     (wrong,) = mistakes(text)
     assert f"{key} of height is 0.0001: need " in wrong
 
 
-def test_no_rule_has_a_persons_name() -> None:
+def test_no_rule_has_a_persons_name():
     """What a person orders passes below the minimum height."""
     (told,) = mistakes(WHOLE.replace("  falls:", "  operator:"))
     assert told == (
@@ -320,11 +316,11 @@ def test_no_rule_has_a_persons_name() -> None:
 
 
 @pytest.mark.parametrize("number", ["1" + "0" * 400, "0x" + "f" * 4000])
-def test_a_number_that_no_float_holds_is_no_number(number: str) -> None:
+def test_a_number_that_no_float_holds_is_no_number(number):
     assert any("need a number" in one for one in mistakes(WHOLE.replace("-12.5", number, 1)))
 
 
-def test_a_key_that_aliases_make_endless_is_not_spelt_out() -> None:
+def test_a_key_that_aliases_make_endless_is_not_spelt_out():
     """Nine times as long with each line: the last one would fill the memory."""
     lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
     for before, name in zip("abcdefghijk", "bcdefghijkl", strict=True):
@@ -333,7 +329,7 @@ def test_a_key_that_aliases_make_endless_is_not_spelt_out() -> None:
     assert told.startswith("mine.yaml, line 12: a key of a profile is no word")
 
 
-def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so() -> None:
+def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so():
     falls = read(WHOLE).rules[0]
     assert falls.doubted == 1.0
     assert all(one.counted for one in falls.conditions)
@@ -343,12 +339,12 @@ def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so() 
     assert [one.counted for one in falls.conditions] == [True, True, True, False, True]
 
 
-def test_a_rule_that_would_be_full_at_once_again_is_refused() -> None:
+def test_a_rule_that_would_be_full_at_once_again_is_refused():
     text = WHOLE.replace("rebooted}", "rebooted, counted: false}")
     assert "with `counted: false` it clears never" in wrong(text)
 
 
-def test_a_rule_that_counts_nothing_is_refused() -> None:
+def test_a_rule_that_counts_nothing_is_refused():
     silent = "conditions: {link: mavlink_parachute, is: LOST}"
     lost = "conditions: {autopilot: lost, counted: false}"
     assert "rule 'silent' counts nothing" in wrong(WHOLE.replace(silent, lost))
@@ -373,7 +369,7 @@ def rule(**lines: str) -> Rule:
     return only
 
 
-def test_a_link_may_be_all_and_a_device_on_any() -> None:
+def test_a_link_may_be_all_and_a_device_on_any():
     assert rule(conditions="{link: all, is: LOST, weight: 2}").conditions == (
         LinkCondition("all", (LinkJudgement.LOST,), 2.0),
     )
@@ -384,13 +380,13 @@ def test_a_link_may_be_all_and_a_device_on_any() -> None:
         assert rule(conditions=text).conditions == (DeviceCondition(DeviceFact.DEPLOYED),)
 
 
-def test_every_word_for_an_action_is_what_it_says() -> None:
+def test_every_word_for_an_action_is_what_it_says():
     words = {"ALARM": Action.NONE, "FLIGHT_BLOCK": Action.FLIGHT_BLOCK}
     for word, action in {**words, "KILL": Action.KILL, "DEPLOY": Action.DEPLOY}.items():
         assert rule(action=word).action is action
 
 
-def test_every_word_for_what_happens_below_the_minimum_is_what_it_says() -> None:
+def test_every_word_for_what_happens_below_the_minimum_is_what_it_says():
     for one in BelowMinimum:
         assert read(WHOLE.replace("nothing", one.value)).below_minimum is one
 
@@ -404,9 +400,7 @@ def test_every_word_for_what_happens_below_the_minimum_is_what_it_says() -> None
         ("moving_speed", 0.1, 20.0, "0.05", "20.5"),
     ],
 )
-def test_a_number_of_the_profile_may_reach_its_limits(
-    key: str, least: float, most: float, less: str, more: str
-) -> None:
+def test_a_number_of_the_profile_may_reach_its_limits(key, least, most, less, more):
     text = f"{ONE_RULE}\n"
     for good in (least, most):
         assert getattr(read(f"{text}{key}: {good}"), key) == good
@@ -423,9 +417,7 @@ def test_a_number_of_the_profile_may_reach_its_limits(
         ("needed", "needed", 1e-6, 1e6, "0.0000005", "1000000.5"),
     ],
 )
-def test_a_number_of_a_rule_may_reach_its_limits(
-    key: str, field: str, least: float, most: float, less: str, more: str
-) -> None:
+def test_a_number_of_a_rule_may_reach_its_limits(key, field, least, most, less, more):
     conditions = "{autopilot: rebooted, weight: 1000000}"
     for good in (least, most):
         assert getattr(rule(conditions=conditions, **{key: f"{good:.6f}"}), field) == good
@@ -436,7 +428,7 @@ def test_a_number_of_a_rule_may_reach_its_limits(
         assert f"mine.yaml, line 7: {said}" in str(caught.value).splitlines()
 
 
-def test_samples_are_counted_in_whole_numbers_up_to_fifty() -> None:
+def test_samples_are_counted_in_whole_numbers_up_to_fifty():
     for good in (1, 2, 50):
         samples = rule(samples=str(good), **{"for": "0.1"}).samples
         assert (samples, type(samples)) == (good, int)
@@ -447,7 +439,7 @@ def test_samples_are_counted_in_whole_numbers_up_to_fifty() -> None:
         assert str(caught.value) == said
 
 
-def test_more_than_one_sample_needs_a_time_in_which_they_come() -> None:
+def test_more_than_one_sample_needs_a_time_in_which_they_come():
     with pytest.raises(ProfileError, match="rule 'a' needs 2 samples at once"):
         rule(samples="2")
     said = "rule 'falls' needs 3 samples at once: add `for`, in which they may come"
@@ -456,7 +448,7 @@ def test_more_than_one_sample_needs_a_time_in_which_they_come() -> None:
     assert rule(samples="1").samples == 1
 
 
-def test_a_weight_may_reach_its_limits() -> None:
+def test_a_weight_may_reach_its_limits():
     for good in ("0.000001", "1000000"):
         condition = f"{{autopilot: rebooted, weight: {good}}}"
         assert rule(conditions=condition).needed == float(good)
@@ -467,7 +459,7 @@ def test_a_weight_may_reach_its_limits() -> None:
         assert str(caught.value) == said
 
 
-def test_as_much_as_all_conditions_weigh_may_be_needed_and_no_more() -> None:
+def test_as_much_as_all_conditions_weigh_may_be_needed_and_no_more():
     assert read(WHOLE.replace("needed: 3", "needed: 5.5")).rules[0].needed == 5.5
     said = "the weights of its conditions add up to only 5.5"
     assert rule(needed="1.000000001").needed == 1.000000001, "that is rounding"
@@ -475,7 +467,7 @@ def test_as_much_as_all_conditions_weigh_may_be_needed_and_no_more() -> None:
     assert told == f"line 20: needed of rule 'falls' is 5.6: {said}"
 
 
-def test_silence_may_add_to_a_deploy_but_never_be_all_of_it() -> None:
+def test_silence_may_add_to_a_deploy_but_never_be_all_of_it():
     assert read(WHOLE.replace("needed: 3", "needed: 1.1")).rules[0].needed == 1.1
     lost = WHOLE.replace("autopilot: rebooted", "autopilot: lost")
     said = "rule 'falls' would deploy on silence alone, which is never done"
@@ -487,7 +479,7 @@ def test_silence_may_add_to_a_deploy_but_never_be_all_of_it() -> None:
     assert rule(conditions="{link: any, is: LOST}").action is Action.KILL, "motors may stop so"
 
 
-def test_a_mistake_in_the_rules_is_told_after_one_in_the_measurements() -> None:
+def test_a_mistake_in_the_rules_is_told_after_one_in_the_measurements():
     text = WHOLE.replace("jump: 20.0", "jump: -1").replace("action: ALARM", "action: ALERT")
     need = "need ALARM or FLIGHT_BLOCK or KILL or DEPLOY (did you mean ALARM?)"
     assert mistakes(text) == [
@@ -496,31 +488,31 @@ def test_a_mistake_in_the_rules_is_told_after_one_in_the_measurements() -> None:
     ]
 
 
-def test_a_limit_that_is_no_number_says_of_what() -> None:
+def test_a_limit_that_is_no_number_says_of_what():
     assert "line 7: jump of height is 'x': need a number" in spoilt("jump: 20.0", "jump: x")
 
 
 @pytest.mark.parametrize("name", STANDARD_LIMITS)
-def test_every_measurement_may_have_limits_of_its_own(name: str) -> None:
+def test_every_measurement_may_have_limits_of_its_own(name):
     limits = read(f"{ONE_RULE}\nmeasurements: {{{name}: {{max_age: 3}}}}").limits
     assert limits[name].max_age == 3.0
     assert {**limits, name: None} == {**STANDARD_LIMITS, name: None}
 
 
-def test_what_is_no_profile_names_its_file_and_what_is_no_rules_says_so() -> None:
+def test_what_is_no_profile_names_its_file_and_what_is_no_rules_says_so():
     assert mistakes("profile: [p\n---\n")[0].startswith("mine.yaml, line 2: not YAML: ")
     need = "need `key: value` lines"
     assert mistakes("profile: p\nrules: 3\n") == [f"mine.yaml, line 2: rules is 3: {need}"]
 
 
-def test_without_any_link_only_any_can_be_named() -> None:
+def test_without_any_link_only_any_can_be_named():
     text = WHOLE.replace("link: upf_can", "link: x")
     with pytest.raises(ProfileError) as caught:
         read_profile(text, "mine.yaml", ())
     assert "mine.yaml, line 19: link in rule 'falls' is 'x': need any" in str(caught.value)
 
 
-def test_what_a_mistake_stands_for_meanwhile_is_no_second_mistake() -> None:
+def test_what_a_mistake_stands_for_meanwhile_is_no_second_mistake():
     """A word that is not known is no silence; the deploy is looked at once it is put right."""
     text = (
         "profile: p\nrules:\n  a:\n    states: KILLING\n    action: DEPLOY\n"
@@ -686,11 +678,11 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
         ("    states: IN_FLIGHT\n -> ", "26: rule 'silent' has no states: add it"),
     ],
 )
-def test_each_mistake_is_told_in_full_and_nothing_besides(spoils: str, told: str) -> None:
+def test_each_mistake_is_told_in_full_and_nothing_besides(spoils, told):
     assert spoilt(*spoils.split(" -> ")) == [f"line {told}"]
 
 
-def test_what_a_profile_is_for_is_a_word_of_four() -> None:
+def test_what_a_profile_is_for_is_a_word_of_four():
     text = "profile: mine\nvehicle: {}\nrules: {{}}\n"
     for kind in Airframe:
         with pytest.raises(ProfileError) as told:

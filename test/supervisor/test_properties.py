@@ -105,7 +105,7 @@ class Run:
 
 @settings(max_examples=300, deadline=None)
 @given(steps(EVIDENCE))
-def test_without_a_request_or_a_released_parachute_nothing_ever_fires(sequence: list) -> None:
+def test_without_a_request_or_a_released_parachute_nothing_ever_fires(sequence):
     run = Run(sequence)
     assert Action.KILL not in run.actions()
     assert Action.DEPLOY not in run.actions()
@@ -113,7 +113,7 @@ def test_without_a_request_or_a_released_parachute_nothing_ever_fires(sequence: 
 
 @settings(max_examples=300, deadline=None)
 @given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer), st.sampled_from(i.Mode))
-def test_what_always_holds(sequence: list, mode: i.Mode) -> None:
+def test_what_always_holds(sequence, mode):
     run = Run(sequence, mode)
     killed = False
     order = (0, 0)
@@ -136,7 +136,7 @@ def test_what_always_holds(sequence: list, mode: i.Mode) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
-def test_each_request_is_answered_exactly_once(sequence: list) -> None:
+def test_each_request_is_answered_exactly_once(sequence):
     run = Run(sequence)
     run.answer_arming(True)
     run.update(())
@@ -150,7 +150,7 @@ def test_each_request_is_answered_exactly_once(sequence: list) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
-def test_looking_twice_at_the_same_moment_decides_nothing_more(sequence: list) -> None:
+def test_looking_twice_at_the_same_moment_decides_nothing_more(sequence):
     run = Run(sequence)
     run.update(())
     assert run.update(()) == ()
@@ -158,7 +158,7 @@ def test_looking_twice_at_the_same_moment_decides_nothing_more(sequence: list) -
 
 @settings(max_examples=100, deadline=None)
 @given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
-def test_the_same_inputs_give_the_same_decisions(sequence: list) -> None:
+def test_the_same_inputs_give_the_same_decisions(sequence):
     first, second = Run(sequence), Run(sequence)
     assert CODEC.to_json(first.state) == CODEC.to_json(second.state)
     assert first.decisions == second.decisions
@@ -172,7 +172,7 @@ def test_the_same_inputs_give_the_same_decisions(sequence: list) -> None:
     ),
     st.integers(0, 2 * MOST_DEVICE_BLOCKS),
 )
-def test_made_up_names_do_not_grow_it_and_releases_leave_nothing(asked: list, more: int) -> None:
+def test_made_up_names_do_not_grow_it_and_releases_leave_nothing(asked, more):
     asked += [i.BlockRequest("stranger", f"made up {n}", True, "") for n in range(more)]
     run = Run([(0.001, one) for one in asked])
     assert len(run.state.device_blocks) <= MOST_DEVICE_BLOCKS

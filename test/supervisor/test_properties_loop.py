@@ -1,7 +1,5 @@
 """The loop closed: core, wires that lose and delay, and device nodes behind their gates."""
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import random
@@ -178,8 +176,8 @@ WIRES = (
 @settings(max_examples=60, deadline=None)
 @given(*WIRES, st.floats(0.0, HEAL), st.lists(st.floats(0.0, 6.0), max_size=3))
 def test_a_deploy_gets_through_once_the_wires_heal_and_the_motors_are_stopped(
-    seed: int, loss: float, slowness: float, restarts: list[float], when: float, kills: list[float]
-) -> None:
+    seed, loss, slowness, restarts, when, kills
+):
     loop = Loop(seed, loss, slowness, restarts)
     assert loop.state.stage is Stage.IN_FLIGHT
     loop.at(START + when, lambda: loop.feed(i.DeployRequest(1, False, "it falls")))
@@ -198,9 +196,7 @@ def test_a_deploy_gets_through_once_the_wires_heal_and_the_motors_are_stopped(
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.0, 0.4), st.floats(0.0, 2.0))
-def test_wires_that_are_only_slow_make_no_device_fire_twice(
-    seed: int, slowness: float, when: float
-) -> None:
+def test_wires_that_are_only_slow_make_no_device_fire_twice(seed, slowness, when):
     # Reports that come later than decisions are sent again must not multiply them.
     loop = Loop(seed, 0.0, slowness, [])
     loop.at(START + when, lambda: loop.feed(i.DeployRequest(1, False, "it falls")))
@@ -215,9 +211,7 @@ def test_wires_that_are_only_slow_make_no_device_fire_twice(
 
 @settings(max_examples=60, deadline=None)
 @given(*WIRES)
-def test_whatever_the_wires_do_nothing_fires_that_nobody_asked_for(
-    seed: int, loss: float, slowness: float, restarts: list[float]
-) -> None:
+def test_whatever_the_wires_do_nothing_fires_that_nobody_asked_for(seed, loss, slowness, restarts):
     loop = Loop(seed, loss, slowness, restarts)
     loop.run(START + 5.0)
     for node in loop.nodes.values():

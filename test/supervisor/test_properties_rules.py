@@ -1,7 +1,5 @@
 """What must always hold, whatever the profile, the settings and the inputs (invariants.py)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
@@ -20,8 +18,8 @@ from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.profile_lines import ALL, ANY
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
+from chute_ros.supervisor.yaml_lines import ALL, ANY
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"
@@ -180,17 +178,13 @@ def begun(config: SupervisorConfig, flying: bool) -> Watch:
 
 @settings(max_examples=300)
 @given(CONFIGS, st.booleans(), st.lists(GOES, max_size=14))
-def test_what_must_always_hold_does(
-    config: SupervisorConfig, flying: bool, goes: list[Any]
-) -> None:
+def test_what_must_always_hold_does(config, flying, goes):
     run(begun(config, flying), goes)
 
 
 @settings(max_examples=100)
 @given(CONFIGS, st.lists(st.one_of(TOLD, OTHER, WAITS, st.just("restart")), max_size=12))
-def test_on_the_ground_and_disarmed_no_rule_of_any_profile_deploys(
-    config: SupervisorConfig, goes: list[Any]
-) -> None:
+def test_on_the_ground_and_disarmed_no_rule_of_any_profile_deploys(config, goes):
     down = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
     watch = Watch(config)
     for one in goes:
@@ -239,9 +233,7 @@ ONLY_SILENCE = st.one_of(
     ),
     st.lists(SILENT, max_size=15),
 )
-def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(
-    rules: list[Rule], goes: list[Any]
-) -> None:
+def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(rules, goes):
     config = SupervisorConfig(deploy_links=(LINK, UPF), profile=_profile(rules))
     watch = begun(config, flying=True)
     for one in goes:
@@ -256,9 +248,7 @@ def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(
     st.sampled_from([{"vertical_speed": -14.0}, {"tilt": 80.0}, {"acceleration": 1.0}]),
     LIES,
 )
-def test_one_that_falls_in_flight_is_killed_and_deployed_whatever_came_before(
-    goes: list[Any], sign: dict[str, float], lie: dict[str, Any]
-) -> None:
+def test_one_that_falls_in_flight_is_killed_and_deployed_whatever_came_before(goes, sign, lie):
     watch = begun(shipped("multirotor", deploy_links=(LINK, UPF)), flying=True)
     run(watch, goes)
     # It flies well for a while, so that it is known to be in the air; then it falls.

@@ -37,7 +37,7 @@ ANY = st.one_of(EVIDENCE, RELEASED, REQUESTS, HEALTHY, REPORTS, VEHICLE, DONE)
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(WAITS, st.lists(ANY, max_size=5).map(tuple)), max_size=25))
-def test_a_deadline_is_served_when_it_comes_whatever_the_rounding(sequence: list) -> None:
+def test_a_deadline_is_served_when_it_comes_whatever_the_rounding(sequence):
     now, state = START, State(epoch=7, started_at=START)
     for wait, inputs in sequence:
         end = now + wait
@@ -58,9 +58,7 @@ def test_a_deadline_is_served_when_it_comes_whatever_the_rounding(sequence: list
     st.lists(st.tuples(st.floats(-5.0, 9.0), st.lists(ANY, max_size=6).map(tuple)), max_size=25),
     st.sampled_from(i.Mode),
 )
-def test_any_number_of_inputs_at_once_and_a_time_that_jumps_raise_nothing(
-    sequence: list, mode: i.Mode
-) -> None:
+def test_any_number_of_inputs_at_once_and_a_time_that_jumps_raise_nothing(sequence, mode):
     now, state = START, State(epoch=7, started_at=START, mode=mode)
     killed, order = False, (0, 0)
     for wait, inputs in sequence:
@@ -80,7 +78,7 @@ def test_any_number_of_inputs_at_once_and_a_time_that_jumps_raise_nothing(
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(WAITS, st.one_of(EVIDENCE, HEALTHY, REPORTS, VEHICLE)), max_size=40))
-def test_a_heartbeat_that_fails_alone_never_fires(sequence: list) -> None:
+def test_a_heartbeat_that_fails_alone_never_fires(sequence):
     now, state = START, State(epoch=7, started_at=START)
     for wait, one in sequence:
         now += wait

@@ -1,7 +1,5 @@
 """A deploy that was too low for one is put off, not used up: roofs, docks and valleys."""
 
-from __future__ import annotations
-
 import pytest
 from story import DOWN, Story, falling, pressure_at, shipped
 
@@ -40,15 +38,13 @@ def from_a_roof(cruise: float, drop: float, barometer: bool = False) -> tuple[St
 
 @pytest.mark.parametrize("barometer", [True, False])
 @pytest.mark.parametrize("cruise", [3.0, 5.0, 9.0, 12.0])
-def test_killed_as_it_looked_too_low_it_is_deployed_once_it_is_below_its_roof(
-    cruise: float, barometer: bool
-) -> None:
+def test_killed_as_it_looked_too_low_it_is_deployed_once_it_is_below_its_roof(cruise, barometer):
     story, start = from_a_roof(cruise, 60.0, barometer)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
     assert story.when(Action.DEPLOY) - start < 2.7
 
 
-def test_the_same_over_level_ground_is_killed_and_no_more() -> None:
+def test_the_same_over_level_ground_is_killed_and_no_more():
     story, _ = from_a_roof(9.0, 0.0)
     for _ in range(100):
         story.at(story.t + EVERY, story.heartbeat(), story.told(**DOWN, height=0.0, tilt=100.0))
@@ -57,8 +53,8 @@ def test_the_same_over_level_ground_is_killed_and_no_more() -> None:
 
 @pytest.mark.parametrize("before", [0.0, 0.1, 0.3])
 def test_what_denied_it_and_falls_silent_a_moment_before_all_else_releases_nothing(
-    before: float,
-) -> None:
+    before,
+):
     """Given a vehicle that tipped over at 5 m and lies on the ground, whose estimator takes itself
     to sink slowly at 19 m, and whose barometer knows better; when its autopilot is heard no more,
     and of it the barometer was heard last a little before (a recorded flight ends so)."""

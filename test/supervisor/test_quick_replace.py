@@ -1,7 +1,5 @@
 """A copy with changes is what dataclasses.replace makes of it, on CPython and as PyPy makes it."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib.util
 import platform

@@ -61,9 +61,7 @@ def through_the_file(turns: list[CoreTurn]) -> list[CoreTurn]:
 
 @settings(max_examples=80)
 @given(SEQUENCES, st.sampled_from(i.Mode))
-def test_a_replay_decides_what_was_decided(
-    sequence: list[tuple[float, list[i.Input]]], mode: i.Mode
-) -> None:
+def test_a_replay_decides_what_was_decided(sequence, mode):
     state = State(epoch=7, started_at=START, mode=mode)
     end, turns = record(MULTIROTOR, state, sequence)
     config = CODEC.from_json(CODEC.to_json(MULTIROTOR, whole=True))
@@ -76,9 +74,7 @@ def test_a_replay_decides_what_was_decided(
 
 @settings(max_examples=40)
 @given(SEQUENCES, SEQUENCES)
-def test_a_replay_may_begin_in_the_middle(
-    before: list[tuple[float, list[i.Input]]], after: list[tuple[float, list[i.Input]]]
-) -> None:
+def test_a_replay_may_begin_in_the_middle(before, after):
     state = State(epoch=7, started_at=START)
     middle, turns = record(MULTIROTOR, state, before)
     later = [(sum(wait for wait, _ in before), []), *after]
@@ -89,7 +85,7 @@ def test_a_replay_may_begin_in_the_middle(
     assert len(turns) == len(before)
 
 
-def test_a_flight_that_ended_under_its_parachute_is_replayed() -> None:
+def test_a_flight_that_ended_under_its_parachute_is_replayed():
     story = Story(MULTIROTOR)
     begin = story.state
     story.ready().fly(1.0).fall(3.0)
@@ -102,7 +98,7 @@ def test_a_flight_that_ended_under_its_parachute_is_replayed() -> None:
     assert str(end) == str(story.state)
 
 
-def test_with_other_settings_the_replay_differs_and_shows_where() -> None:
+def test_with_other_settings_the_replay_differs_and_shows_where():
     story = Story(MULTIROTOR)
     begin = story.state
     story.ready().fly(1.0).fly(2.0, tilt=70.0, vertical_speed=-4.0)

@@ -1,7 +1,5 @@
 """A parachute that was released is not forgotten before a person resets, whoever released it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -42,8 +40,8 @@ def why(story: Story) -> str:
 
 @pytest.mark.parametrize("start", [Story().ready, armed])
 def test_one_that_is_released_past_the_supervisor_on_the_ground_blocks_until_a_reset(
-    start: Any,
-) -> None:
+    start,
+):
     story = start()
     on(story, 1.0, parachute(deployed=True))
     assert story.state.stage is Stage.BLOCKED
@@ -60,7 +58,7 @@ def test_one_that_is_released_past_the_supervisor_on_the_ground_blocks_until_a_r
     assert story.state.alarming.alarms == ()
 
 
-def test_a_reset_counts_for_one_that_still_says_it_but_not_for_the_next_release() -> None:
+def test_a_reset_counts_for_one_that_still_says_it_but_not_for_the_next_release():
     story = Story().ready()
     on(story, 1.0, parachute(deployed=True))
     story.at(1.1, story.heartbeat(), i.ResetRequest(2))
@@ -72,7 +70,7 @@ def test_a_reset_counts_for_one_that_still_says_it_but_not_for_the_next_release(
     assert why(story) == TOLD
 
 
-def test_what_was_released_in_flight_is_remembered_after_the_landing() -> None:
+def test_what_was_released_in_flight_is_remembered_after_the_landing():
     """Nobody ordered it, and the device takes it back: the rules live, and nobody takes off with
     it again."""
     story = Story().flying()
@@ -86,7 +84,7 @@ def test_what_was_released_in_flight_is_remembered_after_the_landing() -> None:
     assert why(story) == TOLD
 
 
-def test_where_it_may_have_bounced_it_holds_nothing_back() -> None:
+def test_where_it_may_have_bounced_it_holds_nothing_back():
     story = Story().flying()
     on(story, 0.1, landed_state=STANDING.landed_state, armed=Armed.ARMED)
     story.at(0.2, story.heartbeat(), parachute(deployed=True))
@@ -94,7 +92,7 @@ def test_where_it_may_have_bounced_it_holds_nothing_back() -> None:
     assert why(story) == ""
 
 
-def test_a_vehicle_that_takes_off_with_it_all_the_same_is_guarded_by_what_is_left() -> None:
+def test_a_vehicle_that_takes_off_with_it_all_the_same_is_guarded_by_what_is_left():
     story = Story().ready()
     on(story, 1.0, parachute(deployed=True))
     on(story, 1.5, parachute(deployed=True), armed=Armed.ARMED)
@@ -103,21 +101,21 @@ def test_a_vehicle_that_takes_off_with_it_all_the_same_is_guarded_by_what_is_lef
     assert "took off although BLOCKED" in story.alarms()
 
 
-def test_a_link_that_deploys_nothing_says_nothing_of_it() -> None:
+def test_a_link_that_deploys_nothing_says_nothing_of_it():
     story = Story(SupervisorConfig(required_links=(LINK, "upf_can"), deploy_links=(LINK,)))
     story.at(0.1, story.heartbeat("upf_can"), parachute("upf_can", "33", deployed=True))
     assert "33" in story.state.evidence("upf_can").devices
     assert story.state.released_since_reset == frozenset()
 
 
-def test_made_up_names_do_not_grow_it() -> None:
+def test_made_up_names_do_not_grow_it():
     story = Story().ready()
     every = [parachute(device=f"1/{n}", deployed=True) for n in range(MOST_RELEASED + 5)]
     story.at(0.1, *every)
     assert len(story.state.released_since_reset) == MOST_RELEASED
 
 
-def test_what_is_left_of_it_in_a_file_comes_back() -> None:
+def test_what_is_left_of_it_in_a_file_comes_back():
     state = State(epoch=1, started_at=START)
     assert dump_released(state) == ""
     released = frozenset({(LINK, "1/161"), ("upf_can", "33")})
@@ -127,6 +125,6 @@ def test_what_is_left_of_it_in_a_file_comes_back() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "{", "{}", "[1]", '["ab"]', '[["a"]]', '[["a", 1]]', "null"])
-def test_a_file_that_says_something_else_is_told(text: str) -> None:
+def test_a_file_that_says_something_else_is_told(text):
     with pytest.raises(RecordError):
         load_released(text)

@@ -39,7 +39,7 @@ def reasons(story: Story) -> str:
     return "; ".join(block_reasons(story.config, story.state, 1000.0 + story.t))
 
 
-def test_flight_is_blocked_from_the_first_moment_until_links_are_healthy() -> None:
+def test_flight_is_blocked_from_the_first_moment_until_links_are_healthy():
     story = Story()
     story.at(0.0)
     assert [d.action for d in story.decisions()] == [BLOCK]
@@ -56,7 +56,7 @@ def test_flight_is_blocked_from_the_first_moment_until_links_are_healthy() -> No
 
 
 @pytest.mark.parametrize("links", [{"deploy_links": ("mistyped",)}, {"kill_links": ("mistyped",)}])
-def test_a_link_that_does_not_exist_blocks_flight_and_is_named(links: dict[str, Any]) -> None:
+def test_a_link_that_does_not_exist_blocks_flight_and_is_named(links):
     story = Story(SupervisorConfig(**links))
     story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.STARTUP
@@ -72,9 +72,7 @@ def test_a_link_that_does_not_exist_blocks_flight_and_is_named(links: dict[str, 
         ((False, LinkState.LOST), "its device is LOST"),
     ],
 )
-def test_missing_stale_lost_and_unhealthy_are_different(
-    heartbeat: tuple[bool, LinkState], words: str
-) -> None:
+def test_missing_stale_lost_and_unhealthy_are_different(heartbeat, words):
     story = Story().ready()
     story.at(0.1, story.heartbeat(healthy=heartbeat[0], state=heartbeat[1]))
     assert story.state.stage is Stage.BLOCKED
@@ -82,14 +80,14 @@ def test_missing_stale_lost_and_unhealthy_are_different(
     assert words in "; ".join(story.newest(BLOCK).reasons)
 
 
-def test_the_faults_of_the_device_are_named() -> None:
+def test_the_faults_of_the_device_are_named():
     story = Story().ready()
     story.at(0.1, parachute(LINK, "1/161", False, ("LOW_POWER",)))
     story.at(0.1, story.heartbeat(healthy=False))
     assert "1/161 LOW_POWER" in reasons(story)
 
 
-def test_a_silent_node_is_stale_and_then_lost_each_at_its_limit() -> None:
+def test_a_silent_node_is_stale_and_then_lost_each_at_its_limit():
     story = Story().ready()
     story.at(0.49)
     assert story.state.stage is Stage.READY
@@ -100,7 +98,7 @@ def test_a_silent_node_is_stale_and_then_lost_each_at_its_limit() -> None:
     assert "LOST, heartbeat of its node 1.00 s old" in reasons(story)
 
 
-def test_a_link_that_comes_back_releases_flight_again() -> None:
+def test_a_link_that_comes_back_releases_flight_again():
     story = Story().ready()
     story.at(2.0)
     story.at(2.1, story.heartbeat(), i.VehicleReport(STANDING))
@@ -112,18 +110,18 @@ def test_a_link_that_comes_back_releases_flight_again() -> None:
     assert story.decisions()[-1].action is RELEASE
 
 
-def test_a_link_that_is_not_required_does_not_block() -> None:
+def test_a_link_that_is_not_required_does_not_block():
     story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).ready()
     assert story.state.stage is Stage.READY
 
 
-def test_a_link_that_is_not_ours_is_not_followed() -> None:
+def test_a_link_that_is_not_ours_is_not_followed():
     story = Story().ready()
     story.at(0.0, story.heartbeat("stranger"), parachute("stranger", "9", True, ()))
     assert set(story.state.heard.links) == {LINK}
 
 
-def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too() -> None:
+def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too():
     story = Story()
     story.at(0.0, parachute(LINK, "1/161", False, ()))
     story.at(0.1, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
@@ -132,7 +130,7 @@ def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too() -> No
     assert len(story.decisions()) == 2
 
 
-def test_a_node_that_never_reports_is_asked_ever_more_rarely_but_once_a_second() -> None:
+def test_a_node_that_never_reports_is_asked_ever_more_rarely_but_once_a_second():
     story = Story()
     story.at(0.0, story.heartbeat(healthy=False))
     for tick in range(1, 3000):
@@ -144,7 +142,7 @@ def test_a_node_that_never_reports_is_asked_ever_more_rarely_but_once_a_second()
     assert len(times) < 320
 
 
-def test_a_block_is_sent_again_until_reported_but_only_to_a_node_that_lives() -> None:
+def test_a_block_is_sent_again_until_reported_but_only_to_a_node_that_lives():
     story = Story()
     story.at(5.0)
     assert not [o for _, o in story.outputs if isinstance(o, i.Decide) and o.again]
@@ -157,7 +155,7 @@ def test_a_block_is_sent_again_until_reported_but_only_to_a_node_that_lives() ->
     assert not [o for _, o in story.outputs[count:] if isinstance(o, i.Decide) and o.again]
 
 
-def test_a_lost_link_in_flight_neither_blocks_nor_fires() -> None:
+def test_a_lost_link_in_flight_neither_blocks_nor_fires():
     story = Story().flying()
     before = len(story.decisions())
     story.at(60.0)
@@ -165,7 +163,7 @@ def test_a_lost_link_in_flight_neither_blocks_nor_fires() -> None:
     assert len(story.decisions()) == before
 
 
-def test_after_landing_it_is_ready_again_once_it_is_disarmed_and_its_links_are_healthy() -> None:
+def test_after_landing_it_is_ready_again_once_it_is_disarmed_and_its_links_are_healthy():
     """By its parachute or by its autopilot, without a reset."""
     for disarmed in (i.ArmDone(0, False, True, "done"), i.VehicleReport(STANDING)):
         story = Story().flying()
@@ -181,14 +179,14 @@ def test_after_landing_it_is_ready_again_once_it_is_disarmed_and_its_links_are_h
     assert story.decisions()[-1].action is BLOCK
 
 
-def test_a_report_on_the_decision_of_another_supervisor_moves_no_epoch() -> None:
+def test_a_report_on_the_decision_of_another_supervisor_moves_no_epoch():
     # Two that overtook each other at every report would never end.
     story = Story().ready()
     story.at(0.1, i.ActionReport(900, 1, LINK, Outcome.SENT, "told", newest_epoch=900))
     assert story.state.epoch == 7
 
 
-def test_a_vehicle_state_that_stops_blocks_flight_at_its_limit() -> None:
+def test_a_vehicle_state_that_stops_blocks_flight_at_its_limit():
     story = Story().ready()
     story.alive(2.4)
     assert story.state.stage is Stage.READY
@@ -204,7 +202,7 @@ def test_a_vehicle_state_that_stops_blocks_flight_at_its_limit() -> None:
     ("difference", "differs"),
     [(0.5, False), (-0.5, False), (0.5625, True), (-0.5625, True), (math.nan, False)],
 )
-def test_a_wall_clock_that_differs_is_an_alarm_once(difference: float, differs: bool) -> None:
+def test_a_wall_clock_that_differs_is_an_alarm_once(difference, differs):
     story = Story(SupervisorConfig(preflight=PreflightLimits(max_clock_difference=0.5)))
     for tick in range(15):
         story.at(tick * 0.1, replace(story.heartbeat(), clock_difference=difference))
@@ -223,9 +221,7 @@ def test_a_wall_clock_that_differs_is_an_alarm_once(difference: float, differs: 
         (5, 5, 1.0, "mavlink_parachute restarted"),
     ],
 )
-def test_a_node_that_may_have_restarted_is_told_again_and_why(
-    before: int, seq: int, t: float, why: str | None
-) -> None:
+def test_a_node_that_may_have_restarted_is_told_again_and_why(before, seq, t, why):
     story = Story()
     story.at(0.0, i.LinkHeartbeat(LINK, LinkState.OK, False, before))
     story.at(0.1, story.report(BLOCK, Outcome.CONFIRMED))
@@ -235,7 +231,7 @@ def test_a_node_that_may_have_restarted_is_told_again_and_why(
     assert anew == ([(*reasons, why)] if why else [])
 
 
-def test_for_how_long_a_node_may_be_silent_is_its_own_setting() -> None:
+def test_for_how_long_a_node_may_be_silent_is_its_own_setting():
     limits = MappingProxyType({LINK: LinkLimits(lost_after=5.0)})
     story = Story(SupervisorConfig(link_limits=limits))
     story.at(0.0, story.heartbeat(healthy=False))
@@ -259,7 +255,7 @@ def under_way() -> Story:
     return story
 
 
-def test_a_node_that_restarts_hears_of_what_it_was_told_and_of_nothing_else() -> None:
+def test_a_node_that_restarts_hears_of_what_it_was_told_and_of_nothing_else():
     story = under_way()
     count = len(story.decisions())
     story.at(0.3, i.LinkHeartbeat(LINK, LinkState.OK, True, 0))
@@ -273,7 +269,7 @@ def test_a_node_that_restarts_hears_of_what_it_was_told_and_of_nothing_else() ->
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.FAILED])
-def test_of_what_it_has_begun_one_that_was_only_silent_is_not_told_again(outcome: Outcome) -> None:
+def test_of_what_it_has_begun_one_that_was_only_silent_is_not_told_again(outcome):
     story = Story(BOTH).flying()
     beats = story.heartbeat(), story.heartbeat(UPF)
     story.at(0.1, *beats, i.KillRequest(5, "operator", "stop"))
@@ -296,9 +292,7 @@ def test_of_what_it_has_begun_one_that_was_only_silent_is_not_told_again(outcome
         ({"deployed": False, "link": UPF}, False),
     ],
 )
-def test_one_that_was_out_before_counts_only_after_it_says_itself_that_it_is_packed(
-    later: dict[str, Any], counts: bool
-) -> None:
+def test_one_that_was_out_before_counts_only_after_it_says_itself_that_it_is_packed(later, counts):
     story = Story(BOTH).ready()
     story.at(0.1, parachute(deployed=True), story.heartbeat(), i.VehicleReport(STANDING))
     story.at(0.2, parachute(**later), i.VehicleReport(FLYING))
@@ -306,13 +300,13 @@ def test_one_that_was_out_before_counts_only_after_it_says_itself_that_it_is_pac
     assert (story.state.stage is Stage.DEPLOYED) is counts
 
 
-def test_a_parachute_that_is_out_counts_although_its_node_was_never_heard() -> None:
+def test_a_parachute_that_is_out_counts_although_its_node_was_never_heard():
     story = Story(BOTH).flying()
     story.at(0.1, parachute(UPF, "33", deployed=True))
     assert story.state.stage is Stage.DEPLOYED
 
 
-def test_the_picture_of_one_takes_nothing_of_what_is_known_of_its_link() -> None:
+def test_the_picture_of_one_takes_nothing_of_what_is_known_of_its_link():
     story = Story().ready()
     story.at(0.1, parachute(device="1/161"))
     story.at(0.2, parachute(device="1/162"))
@@ -336,9 +330,7 @@ BACK = "mavlink_parachute 1/161 no longer reports deployed"
         ({"link": "stranger"}, FLYING, []),
     ],
 )
-def test_a_release_that_is_taken_back_in_the_air_is_an_alarm_in_these_words(
-    one: dict[str, Any], told: VehicleState, alarms: list[str]
-) -> None:
+def test_a_release_that_is_taken_back_in_the_air_is_an_alarm_in_these_words(one, told, alarms):
     story = Story(BOTH).flying()
     story.at(0.1, parachute(deployed=True), story.report(RELEASE, Outcome.SENT))
     assert story.state.stage is Stage.DEPLOYED
@@ -347,7 +339,7 @@ def test_a_release_that_is_taken_back_in_the_air_is_an_alarm_in_these_words(
     assert story.alarms() == alarms
 
 
-def test_one_that_is_taken_back_before_a_flight_was_released_all_the_same() -> None:
+def test_one_that_is_taken_back_before_a_flight_was_released_all_the_same():
     """Although nothing is known of the vehicle."""
     story = Story()
     story.at(0.1, parachute(deployed=True))
@@ -368,9 +360,7 @@ def test_one_that_is_taken_back_before_a_flight_was_released_all_the_same() -> N
         (Armed.ARMED, Armed.ARMED, 0.0),
     ],
 )
-def test_the_height_at_which_it_was_armed_is_kept(
-    before: Armed, now: Armed, height: float
-) -> None:
+def test_the_height_at_which_it_was_armed_is_kept(before, now, height):
     story = Story()
     story.at(0.0, vehicle(armed=before))
     story.at(0.1, vehicle(armed=now, height=7.0))
@@ -381,7 +371,7 @@ def test_the_height_at_which_it_was_armed_is_kept(
     assert story.state.flight.armed_height == 0.0
 
 
-def test_each_measurement_goes_on_from_its_own_past_and_the_distance_from_home() -> None:
+def test_each_measurement_goes_on_from_its_own_past_and_the_distance_from_home():
     story = Story(with_rules()).ready().fly(0.2, latitude=48.0, longitude=11.0)
     story.fly(0.4, latitude=48.5, longitude=11.0)
     assert story.state.measured("height").count == 8
@@ -414,20 +404,18 @@ TWO_HEIGHTS = [(0.125, 1.0), (0.25, 2.0)]
         ([(0.125, math.nan)], []),
     ],
 )
-def test_the_heights_of_the_last_second_are_kept(
-    told: list[tuple[float, float]], kept: list[tuple[float, float]]
-) -> None:
+def test_the_heights_of_the_last_second_are_kept(told, kept):
     assert heights(*told) == kept
 
 
-def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept() -> None:
+def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept():
     state = State(epoch=7, started_at=0.0)
     for now in (0.0, 0.1):
         state, _ = update(SupervisorConfig(), state, (vehicle(height=now),), now)
     assert state.heard.heights == ((0.0, 0.0), (0.1, 0.1))
 
 
-def test_heights_from_before_a_clock_was_set_back_are_not_kept() -> None:
+def test_heights_from_before_a_clock_was_set_back_are_not_kept():
     story = Story()
     for tick in range(8):
         story.at(tick / 8, vehicle(height=float(tick)))
@@ -467,9 +455,7 @@ ANEW = ["the autopilot restarted in flight"]
         ([(DOWN, 2, False), (UP, 3, True), (UP, 3, True)], ANEW),
     ],
 )
-def test_a_restart_of_the_autopilot_counts_in_flight(
-    told: list[tuple[dict[str, Any], int, bool]], alarms: list[str]
-) -> None:
+def test_a_restart_of_the_autopilot_counts_in_flight(told, alarms):
     story = reboots(*told)
     assert story.alarms() == alarms
     assert story.state.flight.rebooted is bool(alarms)
@@ -482,7 +468,7 @@ def older(story: Story, action: Action, link: str = LINK, detail: str = "older")
     return story.report(action, Outcome.FAILED, link, detail)
 
 
-def test_the_newest_details_are_kept_each_once() -> None:
+def test_the_newest_details_are_kept_each_once():
     story = Story().flying()
     story.at(0.1, i.KillRequest(5, "operator", "stop"))
     for number in (*range(10), 5, 9):
@@ -491,7 +477,7 @@ def test_the_newest_details_are_kept_each_once() -> None:
     assert story.state.killing.kill.details == tuple(f"{LINK}: try {n}" for n in range(2, 10))
 
 
-def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is_not() -> None:
+def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is_not():
     """The block and the kill are not for this link, the first step of the ladder neither."""
     config = SupervisorConfig(
         deploy_links=(LINK, UPF),
@@ -509,9 +495,7 @@ def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is
     assert story.state.killing.kill.of(UPF) == frozenset()
 
 
-def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and_says_why() -> (
-    None
-):
+def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and_says_why():
     story = Story().flying()
     story.at(0.1, i.DeployRequest(5, False, "it falls"))
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
@@ -527,7 +511,7 @@ def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and
     assert story.state.stage is Stage.FAULT, "nothing is newer any more"
 
 
-def test_a_kill_that_its_deploy_overtook_leaves_again_although_a_parachute_is_out() -> None:
+def test_a_kill_that_its_deploy_overtook_leaves_again_although_a_parachute_is_out():
     """Motors that turn tear an open canopy."""
     story = Story().flying()
     story.at(0.1, i.DeployRequest(5, False, "it falls"))
@@ -538,7 +522,7 @@ def test_a_kill_that_its_deploy_overtook_leaves_again_although_a_parachute_is_ou
     assert story.newest(K).reasons[-1] == "mavlink_parachute saw a newer decision first"
 
 
-def test_a_kill_that_was_overtaken_is_not_tried_again_once_all_is_given_up() -> None:
+def test_a_kill_that_was_overtaken_is_not_tried_again_once_all_is_given_up():
     for at, decided in ((5.09, 2), (5.11, 1)):
         story = Story(SupervisorConfig(deploy_timeout=1.0, kill_timeout=5.0)).flying()
         story.at(0.1, i.DeployRequest(5, False, "it falls"))
@@ -548,7 +532,7 @@ def test_a_kill_that_was_overtaken_is_not_tried_again_once_all_is_given_up() -> 
         assert len(story.decisions(K)) == decided
 
 
-def test_a_kill_that_was_sent_and_failed_then_was_not_overtaken() -> None:
+def test_a_kill_that_was_sent_and_failed_then_was_not_overtaken():
     story = Story().flying()
     story.at(0.1, i.DeployRequest(5, False, "it falls"))
     story.at(0.2, story.report(K, Outcome.SENT))
@@ -557,7 +541,7 @@ def test_a_kill_that_was_sent_and_failed_then_was_not_overtaken() -> None:
     assert len(story.decisions(K)) == 1
 
 
-def test_a_newer_decision_for_another_link_overtakes_nothing() -> None:
+def test_a_newer_decision_for_another_link_overtakes_nothing():
     config = SupervisorConfig(deploy_links=(UPF,), kill_links=(LINK,))
     story = Story(config)
     story.at(0.0, story.heartbeat(UPF))
@@ -570,7 +554,7 @@ def test_a_newer_decision_for_another_link_overtakes_nothing() -> None:
     assert story.state.killing.kill.all_failed()
 
 
-def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing() -> None:
+def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing():
     story = Story(BOTH).flying()
     story.at(0.1, story.heartbeat(), story.heartbeat(UPF), i.DeployRequest(5, False, "it falls"))
     story.at(0.2, story.report(K, Outcome.SENT, UPF))
@@ -600,7 +584,7 @@ def seen(epoch: int, number: int = 0, outcome: Outcome = Outcome.FAILED) -> i.Ac
     return i.ActionReport(7, 1, LINK, outcome, "older", epoch, number)
 
 
-def test_a_newer_epoch_is_overtaken_in_these_words() -> None:
+def test_a_newer_epoch_is_overtaken_in_these_words():
     story = Story().ready()
     old = story.newest(RELEASE)
     story.at(0.1, seen(900))
@@ -611,7 +595,7 @@ def test_a_newer_epoch_is_overtaken_in_these_words() -> None:
     assert story.alarms() == []
 
 
-def test_the_largest_epoch_cannot_be_overtaken_and_is_an_alarm_in_these_words() -> None:
+def test_the_largest_epoch_cannot_be_overtaken_and_is_an_alarm_in_these_words():
     story = Story().ready()
     story.at(0.1, seen(2**32 - 1))
     assert story.state.epoch == 7
@@ -621,14 +605,14 @@ def test_the_largest_epoch_cannot_be_overtaken_and_is_an_alarm_in_these_words() 
 
 
 @pytest.mark.parametrize(("link", "outcome"), [("stranger", Outcome.FAILED), (LINK, Outcome.NONE)])
-def test_who_is_not_ours_or_says_nothing_moves_no_epoch(link: str, outcome: Outcome) -> None:
+def test_who_is_not_ours_or_says_nothing_moves_no_epoch(link, outcome):
     story = Story().ready()
     story.at(0.1, i.ActionReport(7, 1, link, outcome, "older", newest_epoch=900))
     assert story.state.epoch == 7
 
 
 @pytest.mark.parametrize("rank", [0, 1, 2, 3])
-def test_the_largest_epoch_of_each_rank_can_still_be_used(rank: int) -> None:
+def test_the_largest_epoch_of_each_rank_can_still_be_used(rank):
     story = Story(SupervisorConfig(rank=rank)).ready()
     largest = 2**32 - 4 + rank
     story.at(0.1, seen(largest - 1))
@@ -637,9 +621,7 @@ def test_the_largest_epoch_of_each_rank_can_still_be_used(rank: int) -> None:
 
 
 @pytest.mark.parametrize(("epoch", "number", "foreign"), [(7, 1, False), (7, 2, True)])
-def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(
-    epoch: int, number: int, foreign: bool
-) -> None:
+def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(epoch, number, foreign):
     story = Story().ready()
     assert story.state.next_id == 2
     story.at(0.1, seen(epoch, number, Outcome.CONFIRMED))
@@ -654,8 +636,8 @@ def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(
     [(True, 9, True, 7), (True, 900, False, 904), (False, 9, False, 12)],
 )
 def test_a_standby_yields_to_another_but_not_to_itself_before_its_restart(
-    standby: bool, epoch: int, yields: bool, then: int
-) -> None:
+    standby, epoch, yields, then
+):
     """One that is alone goes on above whoever was there."""
     story = Story(SupervisorConfig(standby=standby)).ready()
     outputs = story.at(0.1, seen(epoch))
@@ -663,7 +645,7 @@ def test_a_standby_yields_to_another_but_not_to_itself_before_its_restart(
     assert story.state.epoch == then
 
 
-def test_one_that_follows_leaves_epochs_alone() -> None:
+def test_one_that_follows_leaves_epochs_alone():
     story = Story().ready().follows()
     story.at(0.1, seen(900))
     assert story.state.epoch == 7

@@ -1,6 +1,5 @@
 """Arm, kill, deploy, reset and mode: what is done, what is refused, each answer in its words."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from operator import attrgetter
 
@@ -115,9 +114,7 @@ NOT_SENT = "mode is SHADOW; nothing is sent"
         (follower, i.ModeRequest(1, i.Mode.SHADOW, force=True), CALL_AGAIN),
     ],
 )
-def test_a_request_is_refused_in_whole_words_and_nothing_is_sent(
-    given: Callable[[], Story], asked: i.Input, why: str
-) -> None:
+def test_a_request_is_refused_in_whole_words_and_nothing_is_sent(given, asked, why):
     story = given()
     story.at(0.15)
     before, stage, mode = len(story.decisions()), story.state.stage, story.state.mode
@@ -130,7 +127,7 @@ def test_a_request_is_refused_in_whole_words_and_nothing_is_sent(
 # -- arming --------------------------------------------------------------------------------------
 
 
-def test_arming_goes_to_the_devices_and_counts_when_they_have_done_it() -> None:
+def test_arming_goes_to_the_devices_and_counts_when_they_have_done_it():
     story = ready()
     outputs = story.at(0.1, i.ArmRequest(1, True, 4))
     assert i.ArmDevices(1, True, 4, (LINK,)) in outputs
@@ -147,7 +144,7 @@ def test_arming_goes_to_the_devices_and_counts_when_they_have_done_it() -> None:
     assert story.state.stage is Stage.READY
 
 
-def test_arming_is_refused_with_every_reason() -> None:
+def test_arming_is_refused_with_every_reason():
     story = Story(mode=i.Mode.SHADOW)
     story.at(0.0, i.ArmRequest(1, True, 0))
     message = story.answer(1).message
@@ -159,7 +156,7 @@ def test_arming_is_refused_with_every_reason() -> None:
     )
 
 
-def test_arming_knows_the_day() -> None:
+def test_arming_knows_the_day():
     story = ready()
     told = replace(parachute().status, packed_date="2024-06-01")
     story.at(0.1, i.ParachuteReport(LINK, told), i.ArmRequest(1, True, 0, day=20_700))
@@ -168,21 +165,21 @@ def test_arming_knows_the_day() -> None:
     )
 
 
-def test_on_the_ground_it_is_disarmed_after_a_kill_in_flight_and_where_nothing_is_said() -> None:
+def test_on_the_ground_it_is_disarmed_after_a_kill_in_flight_and_where_nothing_is_said():
     killed = killed_and_down()
     for story, told in ((killed, [killed.told(**DOWN)]), (Story(), [])):
         outputs = story.at(2.0, *told, i.ArmRequest(2, False, 4))
         assert i.ArmDevices(2, False, 4, (LINK,)) in outputs, story.state.stage
 
 
-def test_a_link_that_fails_takes_the_armed_stage_back() -> None:
+def test_a_link_that_fails_takes_the_armed_stage_back():
     story = ready()
     story.at(0.1, i.ArmDone(0, True, True, ""))
     story.at(0.2, story.heartbeat(healthy=False))
     assert story.state.stage is Stage.BLOCKED
 
 
-def test_a_vehicle_that_takes_off_while_it_is_armed_is_in_flight() -> None:
+def test_a_vehicle_that_takes_off_while_it_is_armed_is_in_flight():
     story = flying()
     story.at(0.1, i.ArmDone(1, True, True, "armed"))
     assert story.state.stage is Stage.IN_FLIGHT
@@ -194,8 +191,8 @@ def test_a_vehicle_that_takes_off_while_it_is_armed_is_in_flight() -> None:
 
 @pytest.mark.parametrize("given", [ready, flying])
 def test_a_kill_leaves_at_once_and_is_answered_once_at_its_confirmation(
-    given: Callable[[], Story],
-) -> None:
+    given,
+):
     story = given()
     story.at(1.0, i.KillRequest(1, "upf operator", "stop"))
     assert story.when(K) == 1.0
@@ -211,7 +208,7 @@ def test_a_kill_leaves_at_once_and_is_answered_once_at_its_confirmation(
     assert story.fired() == ["KILL"]
 
 
-def test_a_kill_that_nobody_confirms_says_so_after_its_limit() -> None:
+def test_a_kill_that_nobody_confirms_says_so_after_its_limit():
     story = flying()
     story.at(1.0, STOP)
     story.at(6.9)
@@ -220,7 +217,7 @@ def test_a_kill_that_nobody_confirms_says_so_after_its_limit() -> None:
     assert "no report within 6.0 s" in story.answer(1).message
 
 
-def test_a_kill_that_failed_everywhere_is_answered_at_once_and_may_be_repeated() -> None:
+def test_a_kill_that_failed_everywhere_is_answered_at_once_and_may_be_repeated():
     story = flying()
     story.at(1.0, STOP)
     story.at(1.1, story.report(K, Outcome.FAILED, detail="no autopilot"))
@@ -229,7 +226,7 @@ def test_a_kill_that_failed_everywhere_is_answered_at_once_and_may_be_repeated()
     assert len(story.decisions(K)) == 2
 
 
-def test_a_second_kill_joins_one_that_is_under_way() -> None:
+def test_a_second_kill_joins_one_that_is_under_way():
     story = flying()
     story.at(1.0, STOP)
     story.at(1.1, i.KillRequest(2, "operator", "stop"))
@@ -239,7 +236,7 @@ def test_a_second_kill_joins_one_that_is_under_way() -> None:
     assert len(story.decisions(K)) == 1
 
 
-def test_a_kill_under_an_open_canopy_is_not_refused() -> None:
+def test_a_kill_under_an_open_canopy_is_not_refused():
     story = flying()
     story.at(1.0, parachute(deployed=True))
     story.at(1.1, story.report(K, Outcome.SENT))
@@ -247,7 +244,7 @@ def test_a_kill_under_an_open_canopy_is_not_refused() -> None:
     assert len(story.decisions(K)) == 2
 
 
-def test_a_device_may_ask_for_a_kill_and_nobody_waits_for_the_answer() -> None:
+def test_a_device_may_ask_for_a_kill_and_nobody_waits_for_the_answer():
     story = flying()
     story.at(1.0, SMOKE)
     assert story.newest(K).rule == "device asks for a kill"
@@ -256,14 +253,14 @@ def test_a_device_may_ask_for_a_kill_and_nobody_waits_for_the_answer() -> None:
 
 
 @pytest.mark.parametrize(("link", "kills"), [("upf_can", 1), (LINK, 0)])
-def test_a_rule_may_listen_to_the_devices_of_one_link(link: str, kills: int) -> None:
+def test_a_rule_may_listen_to_the_devices_of_one_link(link, kills):
     listens = rule(replace(ASKED, link=link), action=K)
     story = Story(with_rules(listens, deploy_links=(LINK, "upf_can"))).flying()
     story.at(0.1, i.KillRequest(0, "upf_can left one", "smoke"))
     assert len(story.decisions(K)) == kills
 
 
-def test_a_wish_is_remembered_as_long_as_it_lasts_and_makes_room_for_the_next() -> None:
+def test_a_wish_is_remembered_as_long_as_it_lasts_and_makes_room_for_the_next():
     story = flying()
     wishes = [i.KillRequest(0, f"upf_can {n}", "smoke") for n in range(MOST_DEVICE_BLOCKS)]
     story.at(1.0, *wishes)
@@ -276,7 +273,7 @@ def test_a_wish_is_remembered_as_long_as_it_lasts_and_makes_room_for_the_next() 
     assert set(story.state.asks) == {"upf_can 0", "late"}
 
 
-def test_a_device_that_asks_anew_is_a_new_occasion_for_the_rules_that_listen_alone() -> None:
+def test_a_device_that_asks_anew_is_a_new_occasion_for_the_rules_that_listen_alone():
     never = {"clears": Clears.NEVER, "action": Action.NONE, "states": tuple(Stage)}
     sinks = rule(SINKS, name="sinks", says="it sinks", **never)
     asked = rule(SINKS, ASKED, name="asked", says="it is asked for", **never)
@@ -287,7 +284,7 @@ def test_a_device_that_asks_anew_is_a_new_occasion_for_the_rules_that_listen_alo
     assert told == ["rule 'sinks': it sinks", *["rule 'asked': it is asked for"] * 2]
 
 
-def test_a_device_that_asks_again_and_again_does_not_undo_what_was_counted() -> None:
+def test_a_device_that_asks_again_and_again_does_not_undo_what_was_counted():
     counts = rule(SINKS, ASKED, action=K, hold=0.5, samples=3)
     story = Story(with_rules(counts)).flying()
     for tick in range(10):
@@ -295,7 +292,7 @@ def test_a_device_that_asks_again_and_again_does_not_undo_what_was_counted() -> 
     assert story.when(K) == pytest.approx(1.5)
 
 
-def test_a_rule_that_has_acted_is_free_to_act_once_a_device_asks_anew() -> None:
+def test_a_rule_that_has_acted_is_free_to_act_once_a_device_asks_anew():
     story = Story(with_rules(rule(SINKS, ASKED, action=Action.NONE))).flying()
     story.at(1.0, story.told(vertical_speed=-13.0), SMOKE)
     assert story.state.rule("tested").latched is True
@@ -314,9 +311,7 @@ def test_a_rule_that_has_acted_is_free_to_act_once_a_device_asks_anew() -> None:
         (ready, i.DeployRequest(1, True, "test"), "operator, forced: test"),
     ],
 )
-def test_a_deploy_is_ordered_with_the_persons_words_and_kills_first(
-    given: Callable[[], Story], one: i.DeployRequest, reason: str
-) -> None:
+def test_a_deploy_is_ordered_with_the_persons_words_and_kills_first(given, one, reason):
     story = given()
     story.at(0.1, one)
     assert (story.newest(K).rule, story.newest(K).reasons) == ("operator", (reason,))
@@ -326,13 +321,13 @@ def test_a_deploy_is_ordered_with_the_persons_words_and_kills_first(
 
 
 @pytest.mark.parametrize("given", [ready, Story])
-def test_a_deploy_of_a_vehicle_that_is_not_heard_says_so(given: Callable[[], Story]) -> None:
+def test_a_deploy_of_a_vehicle_that_is_not_heard_says_so(given):
     story = given()
     story.at(20.0, story.heartbeat(), i.DeployRequest(1, False, "no"))
     assert "(nothing fresh says whether it is in the air)" in story.answer(1).message
 
 
-def test_in_shadow_a_deploy_is_decided_in_words_and_nothing_is_sent() -> None:
+def test_in_shadow_a_deploy_is_decided_in_words_and_nothing_is_sent():
     story = in_shadow()
     story.at(1.0, FALLS)
     assert [d.action for d in story.decisions()][-2:] == [K, D]
@@ -347,7 +342,7 @@ def test_in_shadow_a_deploy_is_decided_in_words_and_nothing_is_sent() -> None:
 # -- a reset -------------------------------------------------------------------------------------
 
 
-def test_a_reset_is_refused_while_it_is_not_known_to_be_down() -> None:
+def test_a_reset_is_refused_while_it_is_not_known_to_be_down():
     story = flying()
     story.at(20.0, i.ResetRequest(2))
     lies = "if it lies still: safety/kill (kill_only), and this again after 10 s"
@@ -363,13 +358,13 @@ def test_a_reset_is_refused_while_it_is_not_known_to_be_down() -> None:
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
-def test_a_reset_of_one_that_is_not_heard_any_more_is_taken_where_nothing_is_under_way() -> None:
+def test_a_reset_of_one_that_is_not_heard_any_more_is_taken_where_nothing_is_under_way():
     story = killed_and_down()
     story.at(30.0, i.ResetRequest(2))
     assert story.answer(2).success
 
 
-def test_a_reset_says_so_to_everyone() -> None:
+def test_a_reset_says_so_to_everyone():
     story = ready()
     story.at(0.1, i.DeployRequest(1, True, "test"), i.KillRequest(2, "operator", "stop"))
     story.at(0.2, i.VehicleReport(STANDING), i.ResetRequest(3))
@@ -379,7 +374,7 @@ def test_a_reset_says_so_to_everyone() -> None:
     assert "KILLING -> STARTUP: a person asked for the start" in story.said().splitlines()
 
 
-def test_after_a_reset_links_have_their_time_to_come_up_again() -> None:
+def test_after_a_reset_links_have_their_time_to_come_up_again():
     story = killed_and_down()
     story.at(20.0, story.told(**DOWN), i.ResetRequest(2))
     story.at(29.9)
@@ -388,7 +383,7 @@ def test_after_a_reset_links_have_their_time_to_come_up_again() -> None:
     assert story.state.stage is Stage.BLOCKED
 
 
-def test_after_a_reset_flight_is_blocked_anew() -> None:
+def test_after_a_reset_flight_is_blocked_anew():
     story = ready()
     story.at(0.1, STOP)
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
@@ -397,7 +392,7 @@ def test_after_a_reset_flight_is_blocked_anew() -> None:
     assert len(story.decisions(BLOCK)) == 2
 
 
-def test_after_a_reset_nothing_of_the_last_deploy_is_left() -> None:
+def test_after_a_reset_nothing_of_the_last_deploy_is_left():
     story = flying().fly(0.95)
     story.at(1.0, i.DeployRequest(5, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
@@ -413,7 +408,7 @@ def test_after_a_reset_nothing_of_the_last_deploy_is_left() -> None:
     assert story.fired() == ["KILL", "DEPLOY"] * 2
 
 
-def test_a_parachute_that_is_tried_after_a_reset_was_out_before_the_flight() -> None:
+def test_a_parachute_that_is_tried_after_a_reset_was_out_before_the_flight():
     story = killed_and_down()
     story.at(2.0, story.heartbeat(), story.told(**DOWN), i.ResetRequest(2))
     story.at(2.1, story.heartbeat(), story.told(**DOWN), parachute(deployed=True))
@@ -423,14 +418,14 @@ def test_a_parachute_that_is_tried_after_a_reset_was_out_before_the_flight() -> 
     assert story.fired() == ["KILL"]
 
 
-def test_after_a_reset_armed_motors_alone_are_no_flight() -> None:
+def test_after_a_reset_armed_motors_alone_are_no_flight():
     story = killed_and_down()
     story.at(2.0, story.heartbeat(), story.told(**DOWN), i.ResetRequest(2))
     story.at(2.1, story.heartbeat(), vehicle(armed=Armed.ARMED))
     assert story.state.stage is Stage.READY
 
 
-def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again() -> None:
+def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again():
     story = flying().fly(1.0)
     again = {"rebooted_in_flight": True, "reboot_count": 1}
     story.fly(1.5, **again)
@@ -442,7 +437,7 @@ def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again
     assert readings.unusable(story.config, story.state, "height", START + story.t) == ""
 
 
-def test_after_a_reset_a_rule_speaks_again() -> None:
+def test_after_a_reset_a_rule_speaks_again():
     told = rule(SINKS, action=Action.NONE, says="it sinks", states=tuple(Stage))
     story = Story(with_rules(told)).ready()
     for token, t in ((1, 0.1), (2, 0.3)):
@@ -452,7 +447,7 @@ def test_after_a_reset_a_rule_speaks_again() -> None:
         assert story.answer(token).success
 
 
-def test_after_a_reset_nothing_of_the_flight_is_remembered() -> None:
+def test_after_a_reset_nothing_of_the_flight_is_remembered():
     story = killed_and_down()
     story.at(1.4, story.heartbeat(), story.told(**DOWN), i.ResetRequest(2))
     new = State(epoch=7, started_at=START + 1.4)
@@ -461,7 +456,7 @@ def test_after_a_reset_nothing_of_the_flight_is_remembered() -> None:
         assert attrgetter(name)(story.state) == attrgetter(name)(new), name
 
 
-def test_after_a_reset_the_alarm_of_the_last_deploy_is_not_said_any_more() -> None:
+def test_after_a_reset_the_alarm_of_the_last_deploy_is_not_said_any_more():
     story = flying().fly(0.95)
     story.at(1.0, i.DeployRequest(5, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
@@ -474,7 +469,7 @@ def test_after_a_reset_the_alarm_of_the_last_deploy_is_not_said_any_more() -> No
     assert len(story.alarms()) == 1
 
 
-def test_a_wish_of_before_a_reset_stops_no_motors_after_it() -> None:
+def test_a_wish_of_before_a_reset_stops_no_motors_after_it():
     story = ready()
     story.at(0.1, SMOKE)
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
@@ -488,7 +483,7 @@ def test_a_wish_of_before_a_reset_stops_no_motors_after_it() -> None:
 # -- a mode --------------------------------------------------------------------------------------
 
 
-def test_a_mode_is_answered_in_whole_words() -> None:
+def test_a_mode_is_answered_in_whole_words():
     story = flying()
     story.at(0.1, i.ModeRequest(1, i.Mode.ACTIVE, force=False))
     assert story.answer(1) == i.Finish(1, True, True, "mode is ACTIVE already")
@@ -502,9 +497,7 @@ def test_a_mode_is_answered_in_whole_words() -> None:
     assert story.answer(4) == i.Finish(4, False, False, "mode changed to SHADOW")
 
 
-def test_on_the_ground_a_mode_needs_no_force_and_inhibited_a_restarted_node_is_told_nothing() -> (
-    None
-):
+def test_on_the_ground_a_mode_needs_no_force_and_inhibited_a_restarted_node_is_told_nothing():
     story = ready()
     story.at(0.1, story.report(RELEASE, Outcome.CONFIRMED))
     story.at(0.2, i.ModeRequest(1, i.Mode.INHIBITED, force=False))
@@ -515,14 +508,14 @@ def test_on_the_ground_a_mode_needs_no_force_and_inhibited_a_restarted_node_is_t
     assert len(story.decisions()) == count
 
 
-def test_inhibited_decides_nothing() -> None:
+def test_inhibited_decides_nothing():
     story = Story(mode=i.Mode.INHIBITED)
     story.at(0.0)
     story.ready().at(1.0, STOP)
     assert story.decisions() == []
 
 
-def test_leaving_active_between_kill_and_deploy_stops_the_deploy_and_says_so() -> None:
+def test_leaving_active_between_kill_and_deploy_stops_the_deploy_and_says_so():
     story = Story().ordered()
     story.at(1.1, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
     assert "mode changed to INHIBITED" in story.answer(5).message
@@ -530,7 +523,7 @@ def test_leaving_active_between_kill_and_deploy_stops_the_deploy_and_says_so() -
     assert story.decisions(D) == []
 
 
-def test_leaving_active_after_the_deploy_left_ends_it_and_it_may_be_ordered_again() -> None:
+def test_leaving_active_after_the_deploy_left_ends_it_and_it_may_be_ordered_again():
     story = Story().deploying()
     story.at(1.2, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
     line = "DEPLOYING -> KILLING: a person changed the mode while a deploy was under way"
@@ -542,7 +535,7 @@ def test_leaving_active_after_the_deploy_left_ends_it_and_it_may_be_ordered_agai
     assert len(story.decisions(D)) == 2
 
 
-def test_a_mode_that_comes_and_goes_within_one_turn_stops_the_deploy() -> None:
+def test_a_mode_that_comes_and_goes_within_one_turn_stops_the_deploy():
     story = Story().deploying()
     story.at(
         1.2,
@@ -556,7 +549,7 @@ def test_a_mode_that_comes_and_goes_within_one_turn_stops_the_deploy() -> None:
     assert len(story.decisions(D)) == 2
 
 
-def test_leaving_active_takes_the_block_back_in_whole_words_and_coming_back_renews_it() -> None:
+def test_leaving_active_takes_the_block_back_in_whole_words_and_coming_back_renews_it():
     story = Story(SupervisorConfig(kill_links=(LINK, "umbilical")))
     story.at(0.0, story.heartbeat(healthy=False))
     story.at(0.1, i.ModeRequest(1, i.Mode.INHIBITED, force=False))
@@ -569,9 +562,7 @@ def test_leaving_active_takes_the_block_back_in_whole_words_and_coming_back_rene
 
 
 @pytest.mark.parametrize(("reported", "releases"), [(False, 2), (True, 1)])
-def test_leaving_active_a_release_is_repeated_if_a_node_may_not_have_it(
-    reported: bool, releases: int
-) -> None:
+def test_leaving_active_a_release_is_repeated_if_a_node_may_not_have_it(reported, releases):
     story = ready()
     if reported:
         story.at(0.1, story.report(RELEASE, Outcome.SENT))
@@ -579,7 +570,7 @@ def test_leaving_active_a_release_is_repeated_if_a_node_may_not_have_it(
     assert len(story.decisions(RELEASE)) == releases
 
 
-def test_what_was_only_said_is_decided_in_active() -> None:
+def test_what_was_only_said_is_decided_in_active():
     story = Story(mode=i.Mode.SHADOW)
     story.at(0.0, story.heartbeat(healthy=False))
     assert [d.shadow for d in story.decisions(BLOCK)] == [True]

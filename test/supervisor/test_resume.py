@@ -1,7 +1,5 @@
 """A supervisor without a standby dies in flight, and its next start goes on where it stopped."""
 
-from __future__ import annotations
-
 import contextlib
 
 import pytest
@@ -35,7 +33,7 @@ def restart(story: Story, after: float) -> list[i.Output]:
     return story._update((i.TakeOver(8),), story.t)
 
 
-def test_killed_between_the_kill_and_the_deploy_it_deploys_at_once() -> None:
+def test_killed_between_the_kill_and_the_deploy_it_deploys_at_once():
     story = Story().flying()
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     assert story.fired() == ["KILL"]
@@ -46,7 +44,7 @@ def test_killed_between_the_kill_and_the_deploy_it_deploys_at_once() -> None:
     assert not any(isinstance(o, i.Finish) for o in outputs), "who asked waits no more"
 
 
-def test_a_vehicle_that_was_falling_meanwhile_is_not_believed_to_stand() -> None:
+def test_a_vehicle_that_was_falling_meanwhile_is_not_believed_to_stand():
     story = Story(shipped("multirotor")).ready().fly(5.0)
     assert story.state.stage is Stage.IN_FLIGHT
     restart(story, 2.5)
@@ -56,7 +54,7 @@ def test_a_vehicle_that_was_falling_meanwhile_is_not_believed_to_stand() -> None
     assert story.fired()[-2:] == ["KILL", "DEPLOY"]
 
 
-def test_what_a_device_has_begun_is_not_sent_again() -> None:
+def test_what_a_device_has_begun_is_not_sent_again():
     story = Story().flying()
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
@@ -72,7 +70,7 @@ def test_what_a_device_has_begun_is_not_sent_again() -> None:
     assert story.state.stage is Stage.DEPLOYED, "its confirmation counts"
 
 
-def test_a_released_parachute_stays_released() -> None:
+def test_a_released_parachute_stays_released():
     story = Story().flying()
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     story.at(1.1, parachute(deployed=True))
@@ -82,7 +80,7 @@ def test_a_released_parachute_stays_released() -> None:
     assert not story.decisions(D), "it opened by itself after the kill"
 
 
-def test_while_it_was_away_nobody_was_silent() -> None:
+def test_while_it_was_away_nobody_was_silent():
     story = Story().flying()
     story.alive(3.0)
     restart(story, 4.0)
@@ -90,7 +88,7 @@ def test_while_it_was_away_nobody_was_silent() -> None:
     assert not story.state.evidence("mavlink_parachute").silent(1.0, START + story.t)
 
 
-def test_on_the_ground_with_nothing_under_way_it_starts_anew() -> None:
+def test_on_the_ground_with_nothing_under_way_it_starts_anew():
     story = Story()
     assert not worth_saving(story.state)
     story.ready()
@@ -109,16 +107,14 @@ def test_on_the_ground_with_nothing_under_way_it_starts_anew() -> None:
         (BOOT, SETTINGS, 30.0, -1.0, "it is -1.0 s old (limit 30 s)"),
     ],
 )
-def test_what_does_not_belong_here_is_not_gone_on_with(
-    boot: str, settings: str, within: float, after: float, why: str
-) -> None:
+def test_what_does_not_belong_here_is_not_gone_on_with(boot, settings, within, after, why):
     story = Story().flying()
     with pytest.raises(RecordError) as error:
         load(left(story), boot, settings, within, START + after)
     assert str(error.value) == why
 
 
-def test_up_to_its_limit_it_is() -> None:
+def test_up_to_its_limit_it_is():
     story = Story().flying()
     for age in (0.0, 30.0):
         state = load(left(story), BOOT, SETTINGS, 30.0, START + age)
@@ -139,13 +135,13 @@ def test_up_to_its_limit_it_is() -> None:
         dump(SavedState("this start of the computer", "these settings", 7)),  # type: ignore[arg-type]
     ],
 )
-def test_garbage_is_an_error_in_words(text: str) -> None:
+def test_garbage_is_an_error_in_words(text):
     with pytest.raises(RecordError):
         load(text, BOOT, SETTINGS, 30.0, START)
 
 
 @given(st.data())
-def test_a_damaged_file_never_raises_anything_else(data: st.DataObject) -> None:
+def test_a_damaged_file_never_raises_anything_else(data):
     text = dump(SavedState(BOOT, SETTINGS, Story(SupervisorConfig()).flying().state))
     at = data.draw(st.integers(0, len(text) - 1))
     damaged = text[:at] + data.draw(st.characters()) + text[at + 1 :]

@@ -1,7 +1,5 @@
 """What the types of rules say by themselves, written once more."""
 
-import enum
-
 import pytest
 from story import SINKS, Story, parachute
 
@@ -20,12 +18,12 @@ ALIVE = {
 
 
 @pytest.mark.parametrize("stage", Stage)
-def test_where_the_rules_of_any_vehicle_live(stage: Stage) -> None:
+def test_where_the_rules_of_any_vehicle_live(stage):
     alive = [rule.name for rule in DEVICE_RULES if stage in rule.states]
     assert alive == ALIVE.get(stage, ["device asks for a kill"])
 
 
-def test_the_rules_of_any_vehicle_stop_the_motors_at_the_first_sign() -> None:
+def test_the_rules_of_any_vehicle_stop_the_motors_at_the_first_sign():
     asks, opened = DEVICE_RULES
     assert asks.conditions == (DeviceCondition(DeviceFact.ASKS_FOR_KILL, "any", 1.0),)
     assert opened.conditions == (DeviceCondition(DeviceFact.DEPLOYED, "any", 1.0),)
@@ -34,7 +32,7 @@ def test_the_rules_of_any_vehicle_stop_the_motors_at_the_first_sign() -> None:
     assert asks.clears is opened.clears is Clears.BY_ITSELF
 
 
-def test_a_device_that_asks_is_obeyed_again_once_it_has_stopped_asking() -> None:
+def test_a_device_that_asks_is_obeyed_again_once_it_has_stopped_asking():
     story = Story().ready()
     story.at(0.1, i.KillRequest(0, "upf_can 33", "smoke"))
     assert story.state.rule("device asks for a kill").latched
@@ -42,7 +40,7 @@ def test_a_device_that_asks_is_obeyed_again_once_it_has_stopped_asking() -> None
     assert not story.state.rule("device asks for a kill").latched
 
 
-def test_a_parachute_that_stays_open_is_acted_on_once() -> None:
+def test_a_parachute_that_stays_open_is_acted_on_once():
     story = Story().flying()
     story.at(0.1, parachute(deployed=True))
     story.at(0.2, parachute())
@@ -50,7 +48,7 @@ def test_a_parachute_that_stays_open_is_acted_on_once() -> None:
     assert story.fired() == ["KILL"]
 
 
-def test_what_a_profile_leaves_out_is_as_its_page_says() -> None:
+def test_what_a_profile_leaves_out_is_as_its_page_says():
     rule = Rule("sinks", (SINKS,), Action.DEPLOY, (Stage.IN_FLIGHT,), needed=1.0)
     assert (rule.hold, rule.leak, rule.samples) == (0.0, 0.5, 1)
     assert (rule.clears, rule.says, rule.source) == (Clears.NEVER, "", "")
@@ -68,5 +66,5 @@ def test_what_a_profile_leaves_out_is_as_its_page_says() -> None:
         (DeviceFact, "asks_for_kill deployed abnormal nothing_out drogue_out"),
     ],
 )
-def test_the_words_of_a_profile_are_those_of_its_page(kind: type[enum.Enum], words: str) -> None:
+def test_the_words_of_a_profile_are_those_of_its_page(kind, words):
     assert " ".join(one.value for one in kind) == words

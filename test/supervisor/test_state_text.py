@@ -1,8 +1,6 @@
 """The state in a sentence: a vehicle that nobody guards never looks like one that is, and what was
 done has who ordered it, why, when and where."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -53,13 +51,13 @@ def goes_on(story: Story, until: float, healthy: bool = True, **states: LinkStat
 # Guarded, and not
 
 
-def test_a_vehicle_that_is_guarded_says_no_more_than_that_it_flies() -> None:
+def test_a_vehicle_that_is_guarded_says_no_more_than_that_it_flies():
     story = flying()
     assert text(story) == "IN_FLIGHT"
     assert told(story) == ()
 
 
-def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded() -> None:
+def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded():
     story = goes_on(flying(), 2.0, upf_can=LinkState.LOST)
     warning = "rule 'link lost' warns: nothing is received from a device"
     assert text(story) == f"IN_FLIGHT: {warning}"
@@ -70,7 +68,7 @@ def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded() -> None:
     assert told(story) == ()
 
 
-def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded() -> None:
+def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded():
     story = goes_on(flying(), 2.0, mavlink_parachute=LinkState.LOST, upf_can=LinkState.LOST)
     why = f"no parachute can be reached: {LINK} is LOST, {UPF} is LOST"
     assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
@@ -78,7 +76,7 @@ def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded() -> None
     assert text(goes_on(story, 4.0)) == "IN_FLIGHT"
 
 
-def test_parachutes_that_are_received_and_not_fit_guard_nobody() -> None:
+def test_parachutes_that_are_received_and_not_fit_guard_nobody():
     story = goes_on(flying(), 2.0, healthy=False)
     why = f"no parachute can be relied on: {LINK} is not healthy, {UPF} is not healthy"
     assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
@@ -87,7 +85,7 @@ def test_parachutes_that_are_received_and_not_fit_guard_nobody() -> None:
     assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
 
 
-def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded() -> None:
+def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded():
     story = flying()
     # When its link is cut, then its nodes are heard and nothing of it is,
     while story.t < 4.0:
@@ -99,7 +97,7 @@ def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded() -> None:
     assert told(story) == (lost, why)
 
 
-def test_heights_alone_are_enough_to_see_a_fall() -> None:
+def test_heights_alone_are_enough_to_see_a_fall():
     story = flying()
     flies = {"armed": FLYING.armed, "landed_state": FLYING.landed_state}
     step = 0
@@ -110,7 +108,7 @@ def test_heights_alone_are_enough_to_see_a_fall() -> None:
     assert "nothing reports" not in text(story)
 
 
-def test_a_profile_that_releases_nothing_itself_says_who_does() -> None:
+def test_a_profile_that_releases_nothing_itself_says_who_does():
     story = flying("by_hand")
     assert text(story) == (
         "IN_FLIGHT: only a person releases: profile by_hand has no rule that does"
@@ -118,7 +116,7 @@ def test_a_profile_that_releases_nothing_itself_says_who_does() -> None:
     assert told(story) == (), "it was chosen"
 
 
-def test_on_the_ground_nobody_needs_a_guard() -> None:
+def test_on_the_ground_nobody_needs_a_guard():
     story = Story(shipped("multirotor", **BOTH))
     story.at(
         0.0, story.heartbeat(state=LinkState.LOST), story.heartbeat(UPF, True, LinkState.LOST)
@@ -131,7 +129,7 @@ def test_on_the_ground_nobody_needs_a_guard() -> None:
 # What was done
 
 
-def test_a_kill_says_by_which_rule_why_when_and_where() -> None:
+def test_a_kill_says_by_which_rule_why_when_and_where():
     story = Story(shipped("multirotor")).flying().fly(2.0, height=100.0)
     story.fall(3.05, height=100.0)
     assert story.state.stage is Stage.KILLING
@@ -142,7 +140,7 @@ def test_a_kill_says_by_which_rule_why_when_and_where() -> None:
     assert text(story).endswith("; the deploy follows")
 
 
-def test_a_kill_by_a_person_says_whose_and_that_no_deploy_follows() -> None:
+def test_a_kill_by_a_person_says_whose_and_that_no_deploy_follows():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.KillRequest(3, "operator", "Anna: the wind", kill_only=True))
     assert text(story) == (
@@ -153,7 +151,7 @@ def test_a_kill_by_a_person_says_whose_and_that_no_deploy_follows() -> None:
     assert text(story).startswith("KILLING: the motors are off, ordered 0 s ago")
 
 
-def test_a_deploy_says_which_step_for_whom_and_whose_order() -> None:
+def test_a_deploy_says_which_step_for_whom_and_whose_order():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.DeployRequest(5, False, "Anna: it burns"))
     story.at(1.1, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
@@ -170,7 +168,7 @@ def test_a_deploy_says_which_step_for_whom_and_whose_order() -> None:
     )
 
 
-def test_a_parachute_that_opens_by_itself_was_not_ordered() -> None:
+def test_a_parachute_that_opens_by_itself_was_not_ordered():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, story.heartbeat(), parachute(deployed=True))
     assert text(story) == (
@@ -178,7 +176,7 @@ def test_a_parachute_that_opens_by_itself_was_not_ordered() -> None:
     )
 
 
-def test_each_parachute_that_is_out_has_the_order_that_was_for_it() -> None:
+def test_each_parachute_that_is_out_has_the_order_that_was_for_it():
     """Given a UPF that launches itself, and a rule that then orders the other one."""
     story = flying(deploy_ladder=(Rung(LINK),)).fly(1.5)
     story.at(story.t, parachute(UPF, "33", deployed=True), parachute())
@@ -193,7 +191,7 @@ def test_each_parachute_that_is_out_has_the_order_that_was_for_it() -> None:
     )
 
 
-def test_a_deploy_long_after_a_kill_alone_does_not_make_that_kill_slow() -> None:
+def test_a_deploy_long_after_a_kill_alone_does_not_make_that_kill_slow():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.KillRequest(5, "operator", "Anna: stop", kill_only=True))
     story.at(1.01, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
@@ -225,7 +223,7 @@ def on_the_ground(until: float = 1.0, **armed: bool) -> Story:
     return story
 
 
-def test_a_kill_on_the_ground_hides_no_armed_parachute() -> None:
+def test_a_kill_on_the_ground_hides_no_armed_parachute():
     """The moment when somebody walks up to it."""
     story = on_the_ground(upf_can=True)
     story.at(1.1, i.KillRequest(5, "operator", "Anna: stop"))
@@ -239,13 +237,13 @@ def test_a_kill_on_the_ground_hides_no_armed_parachute() -> None:
     assert "ARMED" not in text(story)
 
 
-def test_one_of_two_that_is_not_armed_is_named() -> None:
+def test_one_of_two_that_is_not_armed_is_named():
     story = on_the_ground(5.0, upf_can=True)
     assert text(story) == f"ARMED: upf_can 33; NOT armed: {LINK} 1/161"
     assert text(on_the_ground(5.0, upf_can=True, mavlink_parachute=True)) == "ARMED"
 
 
-def test_one_whose_node_is_silent_was_armed_when_it_was_last_received() -> None:
+def test_one_whose_node_is_silent_was_armed_when_it_was_last_received():
     story = on_the_ground(upf_can=True)
     for k in range(1, 60):
         story.at(1.0 + 0.2 * k, story.heartbeat(), i.VehicleReport(STANDING))
@@ -253,7 +251,7 @@ def test_one_whose_node_is_silent_was_armed_when_it_was_last_received() -> None:
     assert "all the same" not in text(story)
 
 
-def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once() -> None:
+def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.DeployRequest(5, False, "Anna: it burns"))
     story.at(1.1, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
@@ -269,7 +267,7 @@ def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once() -> None:
 
 
 @pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
-def test_a_mode_in_which_nobody_is_protected_comes_first(mode: i.Mode) -> None:
+def test_a_mode_in_which_nobody_is_protected_comes_first(mode):
     story = Story(shipped("multirotor"), mode).flying().fly(1.0)
     assert text(story).startswith(f"{mode.name}: ")
     assert text(story).endswith("; IN_FLIGHT: this supervisor guards no vehicle in this mode")

@@ -1,6 +1,5 @@
 """The single steps, word for word and at their limits."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -59,7 +58,7 @@ def reports(**outcomes: Outcome) -> MappingProxyType[str, frozenset[Outcome]]:
 # -- moving --------------------------------------------------------------------------------------
 
 
-def test_a_move_is_said_with_its_reason_and_without_one() -> None:
+def test_a_move_is_said_with_its_reason_and_without_one():
     one = steps()
     one.move(StageEvent.LINKS_HEALTHY)
     one.move(StageEvent.KILL, "smoke")
@@ -74,7 +73,7 @@ def test_a_move_is_said_with_its_reason_and_without_one() -> None:
 # -- deciding ------------------------------------------------------------------------------------
 
 
-def test_a_shadow_names_all_that_it_would_have_sent() -> None:
+def test_a_shadow_names_all_that_it_would_have_sent():
     one = steps(mode=i.Mode.SHADOW, next_id=4)
     fire(one, K, "tested", ("why",))
     fire(one, D, "tested", ("why",))
@@ -85,7 +84,7 @@ def test_a_shadow_names_all_that_it_would_have_sent() -> None:
     assert (one.state.killing.kill, one.state.deploying.deploys) == (None, ())
 
 
-def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
+def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone():
     one = steps(stage=Stage.DEPLOYING, kill=decided(1, K), next_id=4)
     fire(one, D, "tested", ("why",))
     decision = Decision(7, 4, D, "tested", ("why",), (UPF,), False, "1/162")
@@ -100,14 +99,14 @@ def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
     [{"leading": False}, {"mode": i.Mode.INHIBITED}, {"stage": Stage.KILLING}, {"kill": None}],
 )
 def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(
-    known: dict[str, Any],
-) -> None:
+    known,
+):
     one = steps(**{"stage": Stage.DEPLOYING, "kill": decided(1, K), **known})
     fire(one, D, "tested", ("why",))
     assert one.outputs == []
 
 
-def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
+def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device():
     one = steps(next_id=4)
     fire(one, K, "tested", ("why",))
     decision = Decision(7, 4, K, "tested", ("why",), BOTH, False, "")
@@ -116,7 +115,7 @@ def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
 
 
 @pytest.mark.parametrize("known", [{"leading": False}, {"mode": i.Mode.INHIBITED}])
-def test_no_kill_leaves_from_one_that_follows_or_is_inhibited(known: dict[str, Any]) -> None:
+def test_no_kill_leaves_from_one_that_follows_or_is_inhibited(known):
     one = steps(**known)
     fire(one, K, "tested", ("why",))
     assert one.outputs == []
@@ -142,14 +141,12 @@ def test_no_kill_leaves_from_one_that_follows_or_is_inhibited(known: dict[str, A
         (Stage.IN_FLIGHT, {"kill": YOUNG}, (True, False, False)),
     ],
 )
-def test_each_stage_wants_what_still_helps(
-    stage: Stage, known: dict[str, Any], wanted: tuple[bool, bool, bool]
-) -> None:
+def test_each_stage_wants_what_still_helps(stage, known, wanted):
     one = steps(stage=stage, deploys=(decided(2, D),), **known)
     assert tuple(sending.wanted(one, slot) for slot in ("block", "kill", 0)) == wanted
 
 
-def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
+def test_what_is_decided_anew_keeps_its_order_and_its_limits():
     kill = decided(1, K, given_up=True, details=("old",))
     one = steps(stage=Stage.KILLING, kill=kill, next_id=4, deploy_rule="tested")
     renew(one, "kill", "it restarted")
@@ -171,13 +168,13 @@ def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
         {"kill": decided(1, K, outcomes=reports(a=Outcome.CONFIRMED))},
     ],
 )
-def test_a_kill_that_is_done_or_not_wanted_is_not_decided_anew(known: dict[str, Any]) -> None:
+def test_a_kill_that_is_done_or_not_wanted_is_not_decided_anew(known):
     one = steps(**{"stage": Stage.KILLING, "kill": decided(1, K), **known})
     renew(one, "kill", "it restarted")
     assert one.outputs == []
 
 
-def test_a_flight_block_is_decided_anew_also_when_it_was_begun_or_confirmed() -> None:
+def test_a_flight_block_is_decided_anew_also_when_it_was_begun_or_confirmed():
     for outcome in (Outcome.CONFIRMED, Outcome.SENT):
         block = decided(1, BLOCK, outcomes=reports(a=outcome, b=outcome))
         restarted, taken = (steps(stage=Stage.BLOCKED, block=block) for _ in range(2))
@@ -186,7 +183,7 @@ def test_a_flight_block_is_decided_anew_also_when_it_was_begun_or_confirmed() ->
         assert len(restarted.outputs) == len(taken.outputs) == 1, outcome
 
 
-def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
+def test_of_the_deploy_only_what_was_not_begun_is_decided_anew():
     begun = reports(b=Outcome.SENT)
     deploys = (decided(2, D, UPF, outcomes=begun), decided(3, D, LINK))
     kill = decided(1, K, outcomes=reports(a=Outcome.SENT, b=Outcome.SENT))
@@ -202,7 +199,7 @@ def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
     assert one.state.deploying.deploys[1].decision == output.decision
 
 
-def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays() -> None:
+def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays():
     told = reports(a=Outcome.SENT)
     kill = decided(1, K, outcomes=told, details=("a: told",), earlier=frozenset({(7, 0)}))
     one = steps(stage=Stage.KILLING, kill=kill, next_id=4)
@@ -218,7 +215,7 @@ def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays() -> N
     assert follows.outputs == []
 
 
-def test_what_is_sent_again_is_the_same() -> None:
+def test_what_is_sent_again_is_the_same():
     kill = decided(1, K)
     one = steps(kill=kill)
     send_again(one, "kill")
@@ -226,7 +223,7 @@ def test_what_is_sent_again_is_the_same() -> None:
     assert one.state.killing.kill == replace(kill, sent_at=100.0)
 
 
-def test_each_step_of_the_ladder_has_its_own_place() -> None:
+def test_each_step_of_the_ladder_has_its_own_place():
     first, second, third = (decided(number, D) for number in (2, 3, 4))
     one = steps(deploys=(first, second, third))
     assert sending.slots(one) == ("block", "kill", 0, 1, 2)
@@ -241,12 +238,12 @@ def test_each_step_of_the_ladder_has_its_own_place() -> None:
 # -- in words ------------------------------------------------------------------------------------
 
 
-def test_the_details_of_every_step_are_told() -> None:
+def test_the_details_of_every_step_are_told():
     deploys = (decided(2, D, details=("a: x",)), decided(3, D), decided(4, D, details=("b: y",)))
     assert deploy_details(steps(deploys=deploys)) == "a: x; b: y"
 
 
-def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
+def test_an_alarm_is_kept_once_and_the_newest_are_kept():
     one = steps()
     for number in range(20):
         one.alarm(f"alarm {number}")
@@ -256,7 +253,7 @@ def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
     assert len(one.state.alarming.alarms) == 16
 
 
-def test_who_waits_for_nothing_is_not_answered() -> None:
+def test_who_waits_for_nothing_is_not_answered():
     one = steps()
     one.finish(0, True, True, "done")
     one.finish(5, True, False, "done")
@@ -276,14 +273,12 @@ def test_who_waits_for_nothing_is_not_answered() -> None:
         (99.0, {"a": Outcome.CONFIRMED}, False),
     ],
 )
-def test_a_kill_has_failed_when_nobody_is_expected_to_confirm_it_any_more(
-    now: float, outcomes: dict[str, Outcome], failed: bool
-) -> None:
+def test_a_kill_has_failed_when_nobody_is_expected_to_confirm_it_any_more(now, outcomes, failed):
     kill = decided(1, K, outcomes=reports(**outcomes))
     assert kill_failed(steps(now=now), kill) is failed
 
 
-def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_once() -> None:
+def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_once():
     one = steps(now=96.0, kill=decided(1, K), kill_tokens=(5, 6))
     end_kill(one)
     end_kill(one)
@@ -305,9 +300,7 @@ def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_o
         (91.0, {}, []),
     ],
 )
-def test_a_kill_is_answered_with_the_words_of_the_links_once_it_has_ended(
-    now: float, outcomes: dict[str, Outcome], answers: list[i.Finish]
-) -> None:
+def test_a_kill_is_answered_with_the_words_of_the_links_once_it_has_ended(now, outcomes, answers):
     kill = decided(1, K, outcomes=reports(**outcomes), details=("a: ok",))
     one = steps(now=now, kill=kill, kill_tokens=(5,))
     end_kill(one)
@@ -333,8 +326,8 @@ WAITING: dict[str, Any] = {
     ("end", "rule", "reasons"), [(answer_all, "tested", ("why",)), (give_up_waiting, "", ())]
 )
 def test_whoever_waits_is_answered_and_what_was_ordered_stays_unless_it_is_given_up(
-    end: Callable[[Turn, str], None], rule: str, reasons: tuple[str, ...]
-) -> None:
+    end, rule, reasons
+):
     one = steps(**WAITING)
     end(one, "another decides")
     assert one.outputs == [i.Finish(n, False, False, "another decides") for n in (5, 6)]
@@ -343,7 +336,7 @@ def test_whoever_waits_is_answered_and_what_was_ordered_stays_unless_it_is_given
     assert (deploying.deploy_rule, deploying.deploy_reasons) == (rule, reasons)
 
 
-def test_what_is_out_on_the_ground_adds_to_what_was() -> None:
+def test_what_is_out_on_the_ground_adds_to_what_was():
     story = Story(TWO)
     story.at(0.1, story.heartbeat(), i.VehicleReport(STANDING), parachute(deployed=True))
     story.at(0.2, story.heartbeat(UPF), parachute(UPF, "33", True), i.VehicleReport(STANDING))

@@ -1,7 +1,5 @@
 """A sink that nobody commanded is an accident, upright or not; one that was commanded is none."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable
@@ -42,9 +40,7 @@ def sinking(profile: str, fastest: float, barometer: bool = True, **told: float)
 @pytest.mark.parametrize("fastest", [8.0, 10.0, 11.5])
 @pytest.mark.parametrize("barometer", [True, False])
 @pytest.mark.parametrize("told", [{"target_vertical_speed": 0.0}, {"below_target": 4.0}])
-def test_a_level_sink_that_nobody_commanded_is_deployed_in_time(
-    fastest: float, barometer: bool, told: dict[str, float]
-) -> None:
+def test_a_level_sink_that_nobody_commanded_is_deployed_in_time(fastest, barometer, told):
     story = sinking("multirotor", fastest, barometer, **told)
     assert story.fired() == ["KILL"]
     assert story.newest(Action.KILL).rule == "uncommanded sink"
@@ -61,8 +57,8 @@ CAUGHT = (-0.2, -1.3, -3.4, -4.9, -6.5, -5.1, -1.0, -0.6, -1.3, -0.8, -1.6, -1.7
 @pytest.mark.parametrize(("speeds", "released"), [(SANK, True), (CAUGHT, False)])
 @pytest.mark.parametrize("told", [{"target_vertical_speed": 0.0}, {}])
 def test_one_that_sinks_on_by_fits_and_starts_is_deployed_and_one_that_is_caught_is_not(
-    speeds: tuple[float, ...], released: bool, told: dict[str, float]
-) -> None:
+    speeds, released, told
+):
     """Seen of the first: `uncommanded sink` for 6.3 s, and killed at 9.6 m, too low to deploy."""
     story, height = Story(shipped("multirotor")).ready(), 40.0
     for k in range(5 * (len(speeds) - 1)):
@@ -83,7 +79,7 @@ def test_one_that_sinks_on_by_fits_and_starts_is_deployed_and_one_that_is_caught
 
 @AIRCRAFT
 @pytest.mark.parametrize("fastest", [8.0, 10.0])
-def test_where_no_target_is_told_it_is_an_alarm(profile: str, fastest: float) -> None:
+def test_where_no_target_is_told_it_is_an_alarm(profile, fastest):
     story = sinking(profile, fastest)
     assert story.fired() == []
     assert sum("sinks fast" in one for one in story.alarms()) == 1
@@ -91,7 +87,7 @@ def test_where_no_target_is_told_it_is_an_alarm(profile: str, fastest: float) ->
 
 @AIRCRAFT
 @pytest.mark.parametrize("fastest", [5.0, 8.0, 13.0])
-def test_one_that_was_commanded_is_neither(profile: str, fastest: float) -> None:
+def test_one_that_was_commanded_is_neither(profile, fastest):
     story = sinking(profile, fastest, target_vertical_speed=-fastest)
     assert story.fired() == []
     assert not any("sinks fast" in one for one in story.alarms())
@@ -100,9 +96,7 @@ def test_one_that_was_commanded_is_neither(profile: str, fastest: float) -> None
 @AIRCRAFT
 @pytest.mark.parametrize("pulls", [3.0, 5.0])
 @pytest.mark.parametrize("barometer", [True, False])
-def test_one_that_pulls_out_of_a_dive_is_no_accident(
-    profile: str, pulls: float, barometer: bool
-) -> None:
+def test_one_that_pulls_out_of_a_dive_is_no_accident(profile, pulls, barometer):
     """ArduPlane, 30 degrees down by the pilot's stick, then CIRCLE, which keeps the height of that
     moment: below it until it climbs again."""
     story, height, speed, target = Story(shipped(profile)).ready(), 120.0, 0.0, float("nan")
@@ -137,7 +131,7 @@ def aeroplane_sinks(tilt: float, attitude_error: float) -> Story:
     return story
 
 
-def test_a_dive_that_a_pilot_commands_is_no_critical_sink() -> None:
+def test_a_dive_that_a_pilot_commands_is_no_critical_sink():
     """ArduPlane in FBWA, the stick forward: 30 degrees down, 16 m/s, and its attitude follows."""
     story = aeroplane_sinks(tilt=31.0, attitude_error=3.0)
     assert story.fired() == []
@@ -147,9 +141,7 @@ def test_a_dive_that_a_pilot_commands_is_no_critical_sink() -> None:
 @pytest.mark.parametrize(
     ("tilt", "attitude_error"), [(31.0, 60.0), (5.0, 3.0), (31.0, float("nan"))]
 )
-def test_one_that_lies_otherwise_or_flat_or_tells_no_command_is(
-    tilt: float, attitude_error: float
-) -> None:
+def test_one_that_lies_otherwise_or_flat_or_tells_no_command_is(tilt, attitude_error):
     story = aeroplane_sinks(tilt, attitude_error)
     assert story.fired()[:1] == ["KILL"]
     off = attitude_error > 45.0
@@ -182,9 +174,7 @@ def spiral(
     return story
 
 
-def test_an_aeroplane_that_is_far_from_its_command_and_sinks_is_deployed_before_it_is_fast() -> (
-    None
-):
+def test_an_aeroplane_that_is_far_from_its_command_and_sinks_is_deployed_before_it_is_fast():
     story = spiral(attitude_error=68.0)
     assert story.fired() == ["KILL"]
     assert story.newest(Action.KILL).rule == "off its command"
@@ -192,7 +182,7 @@ def test_an_aeroplane_that_is_far_from_its_command_and_sinks_is_deployed_before_
 
 
 @pytest.mark.parametrize("hovers_from", [0.0, 1.9])
-def test_so_is_one_whose_estimator_tells_no_sink(hovers_from: float) -> None:
+def test_so_is_one_whose_estimator_tells_no_sink(hovers_from):
     story = spiral(attitude_error=68.0, hovers_from=hovers_from)
     assert story.fired() == ["KILL"]
     assert story.newest(Action.KILL).rule == "off its command"
@@ -204,7 +194,7 @@ def test_so_is_one_whose_estimator_tells_no_sink(hovers_from: float) -> None:
     [{"attitude_error": 20.0}, {"barometer_sinks": False}],
     ids=["a dive that is commanded", "an estimator that is wrong alone"],
 )
-def test_by_less_than_that_none_is(but: dict[str, float]) -> None:
+def test_by_less_than_that_none_is(but):
     story = spiral(**{"attitude_error": 68.0, **but})
     assert "off its command" not in {one.rule for one in story.decisions()}
 
@@ -213,9 +203,7 @@ def test_by_less_than_that_none_is(but: dict[str, float]) -> None:
     "told", [{"below_target": -100.0}, {"below_target": -100.0, "attitude_error": 0.0}]
 )
 @pytest.mark.parametrize("off", [{}, DOWN])
-def test_a_height_that_was_commanded_far_below_hides_no_fall(
-    told: dict[str, float], off: dict[str, object]
-) -> None:
+def test_a_height_that_was_commanded_far_below_hides_no_fall(told, off):
     """ArduCopter in GUIDED after its take-off: POSITION_TARGET_LOCAL_NED with z 0 in a hover. It
     was disarmed by the ground station, and nothing was released."""
     story = Story(shipped("multirotor")).ready().fly(2.0, **told)
@@ -223,17 +211,17 @@ def test_a_height_that_was_commanded_far_below_hides_no_fall(
 
 
 @pytest.mark.parametrize("told", [{"target_vertical_speed": -9.0}])
-def test_nothing_is_commanded_of_motors_that_are_off(told: dict[str, float]) -> None:
+def test_nothing_is_commanded_of_motors_that_are_off(told):
     story = Story(shipped("multirotor")).ready().fly(2.0)
     assert story.fall(story.t + 1.5, **told, **DOWN).fired()[:1] == ["KILL"]
 
 
-def test_above_the_commanded_height_no_sink_is_missed_and_none_made_up() -> None:
+def test_above_the_commanded_height_no_sink_is_missed_and_none_made_up():
     assert sinking("multirotor", 5.0, below_target=-8.0).fired() == []
 
 
 @pytest.mark.parametrize("told", [{}, {"attitude_error": 90.0}])
-def test_a_tilt_that_nobody_commanded_is_an_accident(told: dict[str, float]) -> None:
+def test_a_tilt_that_nobody_commanded_is_an_accident(told):
     story = Story(shipped("multirotor")).ready().fly(1.0)
     for k in range(20):
         speed = -0.45 * k
@@ -241,7 +229,7 @@ def test_a_tilt_that_nobody_commanded_is_an_accident(told: dict[str, float]) -> 
     assert story.fired() == ["KILL"]
 
 
-def test_a_commanded_one_is_none() -> None:
+def test_a_commanded_one_is_none():
     """A flip, and a dive of 65 degrees."""
     story = Story(shipped("multirotor")).ready().fly(1.0)
     for k in range(40):
@@ -252,9 +240,7 @@ def test_a_commanded_one_is_none() -> None:
 
 @AIRCRAFT
 @pytest.mark.parametrize("target", [0.0, -9.0])
-def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(
-    profile: str, target: float
-) -> None:
+def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(profile, target):
     story, height, chance = Story(shipped(profile)).ready(), 110.0, random.Random(7)
     for k in range(80):
         height -= 0.9 * (k >= 30)
@@ -271,7 +257,7 @@ def test_a_speed_that_is_noise_hides_no_sink_that_heights_and_barometer_tell(
 
 @AIRCRAFT
 @pytest.mark.parametrize("target", [0.0, -9.0])
-def test_nor_does_one_that_stands(profile: str, target: float) -> None:
+def test_nor_does_one_that_stands(profile, target):
     """Given a speed of exactly 0 from before it sinks on, with 9 m/s, to the ground."""
     story, height, sank = Story(shipped(profile)).ready(), 110.0, 0.0
     for k in range(140):
@@ -292,7 +278,7 @@ def test_nor_does_one_that_stands(profile: str, target: float) -> None:
 
 
 @AIRCRAFT
-def test_a_speed_that_stands_in_a_hover_ends_nothing(profile: str) -> None:
+def test_a_speed_that_stands_in_a_hover_ends_nothing(profile):
     """Given whole cm/s, and a barometer that errs."""
     story = Story(shipped(profile)).ready()
     for k in range(300):
@@ -321,13 +307,13 @@ def speeding_up(by: float, lags: float) -> Story:
 
 
 @pytest.mark.parametrize("by", [2.9, 3.5, 4.5])
-def test_an_attitude_that_is_wrong_as_a_descent_begins_ends_no_flight(by: float) -> None:
+def test_an_attitude_that_is_wrong_as_a_descent_begins_ends_no_flight(by):
     """PX4 (MPC_ACC_DOWN_MAX 3) feels 6.8 m/s^2 as it begins one."""
     assert speeding_up(by, 0.5).fired() == []
 
 
 @pytest.mark.parametrize("by", [4.5, 6.0])
-def test_one_that_lies_on_its_back_and_comes_down_faster_than_it_shall_falls(by: float) -> None:
+def test_one_that_lies_on_its_back_and_comes_down_faster_than_it_shall_falls(by):
     assert speeding_up(by, -2.0).fired()[:1] == ["KILL"]
 
 
@@ -377,13 +363,11 @@ def sinks_on(t: float) -> dict[str, float]:
     return {"height": 142.2 - 8.9 * t + wanders, "vertical_speed": -8.9 + wanders}
 
 
-def test_one_that_sinks_on_as_it_was_commanded_when_its_autopilot_fell_silent_does_not_fall() -> (
-    None
-):
+def test_one_that_sinks_on_as_it_was_commanded_when_its_autopilot_fell_silent_does_not_fall():
     assert silent(descending(), 8.0, sinks_on).fired() == []
 
 
-def test_one_whose_motors_stop_in_that_silence_falls() -> None:
+def test_one_whose_motors_stop_in_that_silence_falls():
     def stops(t: float) -> dict[str, float]:
         if t <= 1.0:
             return sinks_on(t)
@@ -396,7 +380,7 @@ def test_one_whose_motors_stop_in_that_silence_falls() -> None:
     assert story.t < 4.0 + 1.0 + 2.5, "as soon as the silence counts"
 
 
-def test_what_its_autopilot_commanded_before_it_commanded_nothing_hides_no_fall() -> None:
+def test_what_its_autopilot_commanded_before_it_commanded_nothing_hides_no_fall():
     """A mode without targets for a second, in which it sinks on; then the silence."""
     story = descending()
     for step in range(1, 11):
@@ -405,5 +389,5 @@ def test_what_its_autopilot_commanded_before_it_commanded_nothing_hides_no_fall(
     assert silent(story, 5.0, lambda t: sinks_on(t + 1.0), math.nan).fired() == ["KILL"]
 
 
-def test_nor_does_what_a_hover_was_commanded() -> None:
+def test_nor_does_what_a_hover_was_commanded():
     assert silent(descending(-0.1), 5.0, sinks_on, -0.1).fired() == ["KILL"]

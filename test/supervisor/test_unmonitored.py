@@ -1,7 +1,5 @@
 """A device that never says anything: hoped for where a person says so, and never believed."""
 
-from __future__ import annotations
-
 import pytest
 from story import DOWN, LINK, Story, parachute
 
@@ -32,20 +30,20 @@ def reasons(story: Story) -> str:
     return "; ".join(story.newest(Action.FLIGHT_BLOCK).reasons)
 
 
-def test_it_forbids_flight_where_nobody_allows_it() -> None:
+def test_it_forbids_flight_where_nobody_allows_it():
     story = standing()
     assert story.state.stage is Stage.BLOCKED
     assert "relay: UNMONITORED, its device never reports anything" in reasons(story)
     assert "unmonitored_links" in reasons(story), "what to do is named"
 
 
-def test_it_forbids_flight_also_as_a_second_parachute_that_flight_does_not_depend_on() -> None:
+def test_it_forbids_flight_also_as_a_second_parachute_that_flight_does_not_depend_on():
     story = standing(required_links=(LINK,), deploy_links=(LINK, RELAY))
     assert story.state.stage is Stage.BLOCKED
     assert "relay: UNMONITORED" in reasons(story)
 
 
-def test_where_it_is_allowed_the_vehicle_may_fly() -> None:
+def test_where_it_is_allowed_the_vehicle_may_fly():
     story = standing(RELAY)
     assert story.state.stage is Stage.READY
     evidence = story.state.evidence(RELAY)
@@ -54,11 +52,11 @@ def test_where_it_is_allowed_the_vehicle_may_fly() -> None:
 
 
 @pytest.mark.parametrize("state", [LinkState.NEVER_SEEN, LinkState.LOST])
-def test_an_output_that_cannot_be_opened_forbids_flight_all_the_same(state: LinkState) -> None:
+def test_an_output_that_cannot_be_opened_forbids_flight_all_the_same(state):
     assert standing(RELAY, state=state).state.stage is Stage.BLOCKED
 
 
-def test_its_node_must_be_heard() -> None:
+def test_its_node_must_be_heard():
     story = standing(RELAY)
     for step in range(1, 21):
         story.at(12.0 + step * 0.1, story.heartbeat(), story.told(**DOWN, height=0.0))
@@ -66,7 +64,7 @@ def test_its_node_must_be_heard() -> None:
     assert "relay: STALE, heartbeat of its node" in reasons(story)
 
 
-def test_one_that_a_person_armed_is_armed_after_a_gap_of_a_link_too() -> None:
+def test_one_that_a_person_armed_is_armed_after_a_gap_of_a_link_too():
     story = standing(RELAY)
     story.at(12.0, *beats(story), i.ArmDone(1, True, True, "it can always fire"))
     assert story.state.stage is Stage.ARMED
@@ -79,7 +77,7 @@ def test_one_that_a_person_armed_is_armed_after_a_gap_of_a_link_too() -> None:
     assert story.state.stage is Stage.READY
 
 
-def test_it_is_the_last_step_of_a_deploy_wherever_it_is_named() -> None:
+def test_it_is_the_last_step_of_a_deploy_wherever_it_is_named():
     links = {"deploy_links": (RELAY, LINK), "required_links": (LINK,)}
     config = SupervisorConfig(unmonitored_links=(RELAY,), **links)
     assert config.ladder == (Rung(LINK), Rung(RELAY))
@@ -89,7 +87,7 @@ def test_it_is_the_last_step_of_a_deploy_wherever_it_is_named() -> None:
     assert named.ladder == (Rung(RELAY), Rung(LINK)), "an order that a person gives counts"
 
 
-def test_a_deploy_that_was_sent_is_never_taken_for_confirmed() -> None:
+def test_a_deploy_that_was_sent_is_never_taken_for_confirmed():
     story = standing(RELAY)
     for step in range(1, 21):
         story.at(12.0 + step * 0.1, *beats(story), story.told(height=50.0))
@@ -110,7 +108,7 @@ def test_a_deploy_that_was_sent_is_never_taken_for_confirmed() -> None:
     assert story.alarms() == [alarm, *[f"still no parachute confirmed: {alarm}"] * 3]
 
 
-def test_while_another_link_may_yet_confirm_a_deploy_the_relay_s_sent_does_not_end_it() -> None:
+def test_while_another_link_may_yet_confirm_a_deploy_the_relay_s_sent_does_not_end_it():
     story = standing(RELAY, required_links=(LINK,), deploy_links=(LINK, RELAY))
     for step in range(1, 21):
         story.at(12.0 + step * 0.1, *beats(story), parachute(), story.told(height=80.0))
@@ -128,7 +126,7 @@ def test_while_another_link_may_yet_confirm_a_deploy_the_relay_s_sent_does_not_e
     assert story.state.stage is Stage.DEPLOYED, "the first one opened late"
 
 
-def test_beside_a_parachute_that_tells_it_fires_once_that_one_does_not_open() -> None:
+def test_beside_a_parachute_that_tells_it_fires_once_that_one_does_not_open():
     story = standing(RELAY, required_links=(LINK,), deploy_links=(RELAY, LINK))
     for step in range(1, 21):
         story.at(12.0 + step * 0.1, *beats(story), parachute(), story.told(height=80.0))
@@ -139,6 +137,6 @@ def test_beside_a_parachute_that_tells_it_fires_once_that_one_does_not_open() ->
     assert [d.targets for d in story.decisions(Action.DEPLOY)] == [(LINK,), (RELAY,)]
 
 
-def test_a_link_that_is_not_there_cannot_be_allowed() -> None:
+def test_a_link_that_is_not_there_cannot_be_allowed():
     with pytest.raises(ParameterError, match="unmonitored_links names relay: need one of mavlink"):
         SupervisorConfig(unmonitored_links=(RELAY,))

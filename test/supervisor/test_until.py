@@ -1,7 +1,5 @@
 """A sign that filled its rule's counter goes on until it is over: `until`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -46,8 +44,8 @@ def flying(profile: str = "multirotor") -> Story:
     ],
 )
 def test_a_fall_that_was_seen_counts_while_drag_carries_less_than_the_weight(
-    profile: str, lasts: float, then: float, fires: bool
-) -> None:
+    profile, lasts, then, fires
+):
     """Given an IMU alone, whose force falls as its autopilot falls silent."""
     story = flying(profile)
     story.fly(story.t + lasts, **IMU_ALONE, acceleration=2.0)
@@ -61,7 +59,7 @@ def test_a_fall_that_was_seen_counts_while_drag_carries_less_than_the_weight(
         assert ", then until 8.5)" in reasons
 
 
-def test_once_carried_it_must_fall_for_long_again() -> None:
+def test_once_carried_it_must_fall_for_long_again():
     story = flying().fly(1.6, **IMU_ALONE, acceleration=2.0)
     story.fly(story.t + 0.1, **IMU_ALONE, acceleration=9.8)
     story.fly(story.t + 1.0, **IMU_ALONE, **LOST, acceleration=5.0)
@@ -70,7 +68,7 @@ def test_once_carried_it_must_fall_for_long_again() -> None:
     assert story.fired()[0] == "KILL"
 
 
-def test_what_has_been_kept_is_kept_with_its_counter() -> None:
+def test_what_has_been_kept_is_kept_with_its_counter():
     story = Story(with_rules(FALLS)).flying()
     name = FALLS.name
 
@@ -94,7 +92,7 @@ def test_what_has_been_kept_is_kept_with_its_counter() -> None:
 
 
 @pytest.mark.parametrize(("slept", "goes_on"), [(0.1, True), (2.0, False)])
-def test_a_counter_that_was_emptied_has_kept_nothing(slept: float, goes_on: bool) -> None:
+def test_a_counter_that_was_emptied_has_kept_nothing(slept, goes_on):
     """Given a supervisor that sleeps for longer than half of the silence that it waits for."""
     name = LOST_AND_FALLING
     story = flying().fly(1.6, **IMU_ALONE, acceleration=2.0)
@@ -113,7 +111,7 @@ def beside_tilt(needed: float) -> Rule:
     return replace(FALLS, conditions=(*FALLS.conditions, tilted), needed=needed)
 
 
-def test_what_is_kept_outlasts_a_leak_and_ends_with_an_empty_counter() -> None:
+def test_what_is_kept_outlasts_a_leak_and_ends_with_an_empty_counter():
     """Given two signs, of which the second ends while the first goes on."""
     both = beside_tilt(2.0)
     story = Story(with_rules(both)).flying()
@@ -135,7 +133,7 @@ def test_what_is_kept_outlasts_a_leak_and_ends_with_an_empty_counter() -> None:
     [{"acceleration": math.nan}, {"acceleration": 0.0}, {"age": 0.3}],
     ids=["not told", "in doubt", "late"],
 )
-def test_one_word_that_says_nothing_ends_nothing(profile: str, word: dict[str, float]) -> None:
+def test_one_word_that_says_nothing_ends_nothing(profile, word):
     """Given a fall that an IMU saw, and one word of it that is of no use."""
     story = flying(profile)
     story.fly(story.t + 1.3, **IMU_ALONE, acceleration=2.0)
@@ -147,7 +145,7 @@ def test_one_word_that_says_nothing_ends_nothing(profile: str, word: dict[str, f
     assert story.fired()[0] == "KILL"
 
 
-def test_a_gap_ends_nothing() -> None:
+def test_a_gap_ends_nothing():
     story = flying().fly(1.6, **IMU_ALONE, acceleration=2.0)
     story.fly(story.t + 0.2, **IMU_ALONE, acceleration=5.0)
     story.fly(story.t + 1.0, **{**IMU_ALONE, "acceleration": math.nan})
@@ -157,9 +155,7 @@ def test_a_gap_ends_nothing() -> None:
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 @pytest.mark.parametrize("force", [2.5, 0.0], ids=["wrong", "in doubt"])
-def test_one_sample_keeps_nothing_of_a_counter_that_another_sign_filled(
-    profile: str, force: float
-) -> None:
+def test_one_sample_keeps_nothing_of_a_counter_that_another_sign_filled(profile, force):
     """Given a vehicle that banks for long, beside one wrong word of its force."""
     story = flying(profile)
     story.fly(story.t + 1.5, **{**IMU_ALONE, "tilt": 75.0}, acceleration=9.8)
@@ -169,7 +165,7 @@ def test_one_sample_keeps_nothing_of_a_counter_that_another_sign_filled(
     assert story.fired() == []
 
 
-def test_it_goes_on_for_five_seconds() -> None:
+def test_it_goes_on_for_five_seconds():
     """Given a force that is told too small for the whole flight, and was a fall's for a while."""
     story = flying().fly(1.6, **IMU_ALONE, acceleration=2.0)
     story.fly(story.t + LINGERS - 0.1, **IMU_ALONE, acceleration=8.4)
@@ -180,7 +176,7 @@ def test_it_goes_on_for_five_seconds() -> None:
     assert story.fired() == []
 
 
-def test_what_is_only_taken_to_be_so_keeps_nothing() -> None:
+def test_what_is_only_taken_to_be_so_keeps_nothing():
     """Given a force that is not told, and a sign that fills the counter."""
     presumed = replace(FALLS.conditions[0], if_unknown=True)
     both = beside_tilt(1.0)
@@ -191,7 +187,7 @@ def test_what_is_only_taken_to_be_so_keeps_nothing() -> None:
     assert story.state.rule(both.name).holds is False
 
 
-def test_another_rule_of_the_name_has_kept_nothing() -> None:
+def test_another_rule_of_the_name_has_kept_nothing():
     story = Story(with_rules(FALLS)).flying()
     story.fly(story.t + 0.7, acceleration=3.0)
     two = replace(FALLS, conditions=FALLS.conditions * 2, needed=1.0)

@@ -1,7 +1,5 @@
 """Most updates are heartbeats: rules on the vehicle are looked at only where something changed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -62,7 +60,7 @@ def flying(*rules: Rule) -> Story:
     return Story(with_rules(*rules)).flying().fly(1.0)
 
 
-def test_a_heartbeat_looks_at_no_rule_that_rests_on_the_vehicle(looked: list[str]) -> None:
+def test_a_heartbeat_looks_at_no_rule_that_rests_on_the_vehicle(looked):
     story = flying(
         rule(TILTS, name="tilts"),
         rule(LOST, TILTS, name="lost"),
@@ -85,9 +83,7 @@ def test_a_heartbeat_looks_at_no_rule_that_rests_on_the_vehicle(looked: list[str
         pytest.param({"tilt": math.nan}, id="cannot be said"),
     ],
 )
-def test_a_rule_that_holds_or_of_which_nothing_can_be_said_is_looked_at(
-    looked: list[str], told: dict[str, float]
-) -> None:
+def test_a_rule_that_holds_or_of_which_nothing_can_be_said_is_looked_at(looked, told):
     story = flying(rule(TILTS, action=ALARM, hold=60.0)).fly(1.1, tilt=90.0)
     story.fly(1.2, **told)
     looked.clear()
@@ -95,7 +91,7 @@ def test_a_rule_that_holds_or_of_which_nothing_can_be_said_is_looked_at(
     assert "tested" in looked
 
 
-def test_a_rule_that_was_acted_on_is_looked_at_until_it_is_done_with(looked: list[str]) -> None:
+def test_a_rule_that_was_acted_on_is_looked_at_until_it_is_done_with(looked):
     story = flying(rule(TILTS, action=ALARM)).fly(1.2, tilt=90.0).fly(1.4)
     assert story.state.rule("tested").latched
     looked.clear()
@@ -103,7 +99,7 @@ def test_a_rule_that_was_acted_on_is_looked_at_until_it_is_done_with(looked: lis
     assert looked == ["tested"]
 
 
-def test_a_rule_that_has_just_come_to_life_is_looked_at(looked: list[str]) -> None:
+def test_a_rule_that_has_just_come_to_life_is_looked_at(looked):
     states = (Stage.KILLING,)
     story = flying(rule(TILTS, states=states))
     looked.clear()
@@ -114,7 +110,7 @@ def test_a_rule_that_has_just_come_to_life_is_looked_at(looked: list[str]) -> No
 @pytest.mark.parametrize(
     ("part", "after"), [("tilt", 0.5), ("vertical_speed", 1.0), ("battery_remaining", 10.0)]
 )
-def test_time_alone_makes_what_was_measured_too_old(part: str, after: float) -> None:
+def test_time_alone_makes_what_was_measured_too_old(part, after):
     story = Story(with_rules()).flying()
     told = story.told().state
     story.at(0.5, i.VehicleReport(told))
@@ -129,7 +125,7 @@ def test_time_alone_makes_what_was_measured_too_old(part: str, after: float) -> 
 
 
 @pytest.mark.parametrize(("armed_age", "after"), [(0.0, 2.5), (1.0, 1.5), (-1.0, 2.5)])
-def test_time_alone_makes_what_it_says_of_itself_too_old(armed_age: float, after: float) -> None:
+def test_time_alone_makes_what_it_says_of_itself_too_old(armed_age, after):
     story = Story(with_rules()).flying()
     said = replace(story.told().state, armed_age=armed_age)
     gone = {"tilt": math.nan, "vertical_speed": math.nan, "height": math.nan}
@@ -157,7 +153,7 @@ PROFILES = pytest.mark.parametrize("profile", NAMES)
 
 
 @PROFILES
-def test_a_fall_is_judged_the_same(profile: str) -> None:
+def test_a_fall_is_judged_the_same(profile):
     story = story_of(profile)
     story.fall(3.0, 300.0, tilt=100.0)
     heartbeats(story, 5.0)
@@ -168,9 +164,7 @@ def test_a_fall_is_judged_the_same(profile: str) -> None:
     ("profile", "gone"),
     combinations(NAMES, ["tilt", "acceleration", "vertical_speed", "height", "battery_remaining"]),
 )
-def test_a_fall_with_a_measurement_that_ends_in_it_is_judged_the_same(
-    profile: str, gone: str
-) -> None:
+def test_a_fall_with_a_measurement_that_ends_in_it_is_judged_the_same(profile, gone):
     story = story_of(profile)
     story.fall(1.3, 300.0, tilt=30.0)
     for value, until in ((math.nan, 2.6), (0.0, 4.0)):
@@ -182,7 +176,7 @@ def test_a_fall_with_a_measurement_that_ends_in_it_is_judged_the_same(
 
 
 @PROFILES
-def test_an_autopilot_that_is_lost_starts_anew_or_disarms_is_judged_the_same(profile: str) -> None:
+def test_an_autopilot_that_is_lost_starts_anew_or_disarms_is_judged_the_same(profile):
     story = story_of(profile)
     story.fly(2.0, link_state=LinkState.LOST)
     heartbeats(story, 5.0)
@@ -194,7 +188,7 @@ def test_an_autopilot_that_is_lost_starts_anew_or_disarms_is_judged_the_same(pro
     heartbeats(story, 9.0)
 
 
-def test_measurements_from_the_future_are_judged_the_same() -> None:
+def test_measurements_from_the_future_are_judged_the_same():
     story = story_of("multirotor")
     for step in range(40):
         told = story.told(tilt=100.0, vertical_speed=-9.0).state
@@ -204,14 +198,14 @@ def test_measurements_from_the_future_are_judged_the_same() -> None:
     heartbeats(story, 8.0)
 
 
-def test_at_the_very_moment_at_which_something_turns_too_old_it_is_looked_at() -> None:
+def test_at_the_very_moment_at_which_something_turns_too_old_it_is_looked_at():
     story = Story(with_rules()).flying().fly(1.0)
     known = story.state.measured("tilt_deg")
     turns = known.measured_at + story.config.profile.limits["tilt_deg"].max_age
     assert rests_until(story.config, story.state, turns) < turns
 
 
-def test_what_may_come_to_hold_by_silence_wakes_beside_what_others_wait_for() -> None:
+def test_what_may_come_to_hold_by_silence_wakes_beside_what_others_wait_for():
     counts = rule(TILTS, name="counts", hold=0.7)
     unknown = MeasurementCondition("acceleration", below=1.0, if_unknown=True)
     silent = rule(unknown, MeasurementCondition("tilt_deg", above=80.0), name="silent")

@@ -1,7 +1,5 @@
 """A loop around a CAN wire, and frames to send over it, for the tests of the CAN transport."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket

@@ -1,7 +1,5 @@
 """A protocol that only remembers, and a loop around it, for the tests of the transport."""
 
-from __future__ import annotations
-
 import math
 import os
 import socket

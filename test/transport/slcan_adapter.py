@@ -1,7 +1,5 @@
 """A CAN adapter that speaks the LAWICEL protocol on a pseudo terminal, for the tests of slcan."""
 
-from __future__ import annotations
-
 import os
 import select
 import threading

@@ -1,7 +1,5 @@
 """A loop that does not keep up says by how much; one that has nothing to do does not."""
 
-from __future__ import annotations
-
 import threading
 import time
 
