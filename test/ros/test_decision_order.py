@@ -56,9 +56,7 @@ def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench):
     assert hung.carrier.counts()["decisions: the same as one already acted on"] == 4
 
 
-def test_those_of_a_supervisor_that_is_deposed_do_not_get_before_its_successors(
-    bench,
-):
+def test_those_of_a_supervisor_that_is_deposed_do_not_get_before_its_successors(bench):
     hung = Hung(bench)
     hung.told((1, Action.FLIGHT_BLOCK_RELEASE), (9, Action.DEPLOY, 1), epoch=2)
     hung.goes_on()

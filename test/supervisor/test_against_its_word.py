@@ -45,9 +45,7 @@ OFF: dict[str, Any] = {"landed_state": GROUND, "armed": Armed.DISARMED}
 
 
 @pytest.mark.parametrize("off", [{"landed_state": GROUND, "tilt": 90.0}, OFF])
-def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_it(
-    off,
-):
+def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_it(off):
     """Nor one after which the autopilot disarmed by itself."""
     disarms = "armed" in off
     story = aloft().fly(8.0, landed_state=GROUND)

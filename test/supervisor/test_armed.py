@@ -70,9 +70,7 @@ def test_the_core_wakes_for_it_by_itself():
         (says(True), says(False, "umbilical")),
     ],
 )
-def test_it_stays_armed_while_one_says_so_or_nobody_knows(
-    told,
-):
+def test_it_stays_armed_while_one_says_so_or_nobody_knows(told):
     story = armed(deploy_links=(LINK, UPF), required_links=(LINK,))
     keeps_saying(story, 5.0, *told)
     assert story.state.stage is Stage.ARMED

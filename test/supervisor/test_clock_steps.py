@@ -66,9 +66,7 @@ def test_of_what_waited_while_this_host_hung_the_first_was_not_sent_just_now(ste
         max_size=6,
     )
 )
-def test_nothing_seems_to_come_from_the_future(
-    hangs,
-):
+def test_nothing_seems_to_come_from_the_future(hangs):
     """Hangs, steps of the clock meanwhile, and heartbeats that waited, on ways of any length."""
     clocks, now = heard_so_far()
     clock = 0.0

@@ -403,9 +403,7 @@ WISH = rule(DeviceCondition(DeviceFact.ASKS_FOR_KILL), action=K, states=(Stage.I
 
 
 @pytest.mark.parametrize("secured", [False, True])
-def test_what_was_said_of_a_flight_is_said_again_in_the_next_but_not_after_a_bounce(
-    secured,
-):
+def test_what_was_said_of_a_flight_is_said_again_in_the_next_but_not_after_a_bounce(secured):
     story = Story(with_rules(ALARM)).ready()
     armed = Armed.DISARMED if secured else Armed.ARMED
     for start in (0.0, 2.0):
@@ -417,9 +415,7 @@ def test_what_was_said_of_a_flight_is_said_again_in_the_next_but_not_after_a_bou
 
 
 @pytest.mark.parametrize("stage", [Stage.READY, Stage.LANDED])
-def test_what_a_device_wished_before_the_flight_is_not_done_in_it_unless_it_bounced(
-    stage,
-):
+def test_what_a_device_wished_before_the_flight_is_not_done_in_it_unless_it_bounced(stage):
     story = Story(with_rules(WISH)).ready()
     if stage is Stage.LANDED:
         story.at(0.1, i.VehicleReport(FLYING))
@@ -442,9 +438,7 @@ def test_who_has_flown_before_is_no_longer_taken_to_have_been_released_before():
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_what_was_out_on_the_ground_says_nothing_of_the_flight_where_it_is_known_to_stand(
-    known,
-):
+def test_what_was_out_on_the_ground_says_nothing_of_the_flight_where_it_is_known_to_stand(known):
     story = Story(SupervisorConfig(require_vehicle_state=False))
     standing = [i.VehicleReport(STANDING)] if known else []
     story.at(0.0, story.heartbeat(), parachute(deployed=True), *standing)

@@ -91,9 +91,7 @@ KILL, DEPLOY = kind(Action.KILL, 7, 2), kind(Action.DEPLOY, 7, 3)
         ],
     ],
 )
-def test_each_decision_is_judged_by_those_before_it(
-    told,
-):
+def test_each_decision_is_judged_by_those_before_it(told):
     one = gate()
     for each, age, verdict in told:
         assert one.judge(each, age) is verdict, (each, age)
@@ -120,9 +118,7 @@ def test_who_led_before_another_decided_for_others_is_not_obeyed():
         )
     )
 )
-def test_no_decision_is_ever_acted_on_twice_nor_out_of_order(
-    sent,
-):
+def test_no_decision_is_ever_acted_on_twice_nor_out_of_order(sent):
     one, acted = gate(), []
     for epoch, number, ours, age, shadow in sent:
         targets = (LINK,) if ours else ("other",)

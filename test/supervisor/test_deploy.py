@@ -306,9 +306,7 @@ def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named():
 
 
 @pytest.mark.parametrize("alive", [True, False])
-def test_what_was_said_before_a_parachute_or_its_node_fell_silent_is_not_believed(
-    alive,
-):
+def test_what_was_said_before_a_parachute_or_its_node_fell_silent_is_not_believed(alive):
     story = Story().ready()
     story.at(0.1, parachute(deployed=True), parachute(deployed=True, alive=alive))
     story.at(10.0, i.DeployRequest(5, True, "once more"))
@@ -521,9 +519,7 @@ def test_the_alarm_stops_at_a_reset_on_the_ground():
 
 
 @pytest.mark.parametrize("kills", [False, True])
-def test_a_confirmation_that_comes_after_the_end_counts_and_nothing_fires_again(
-    kills,
-):
+def test_a_confirmation_that_comes_after_the_end_counts_and_nothing_fires_again(kills):
     story = at_its_end()
     if kills:
         story.at(1.2, i.KillRequest(6, "operator", "stop"))

@@ -262,9 +262,7 @@ def test_dropped_messages_do_not_reset_the_count():
 
 
 @pytest.mark.parametrize("armed", [Armed.ARMED, Armed.DISARMED])
-def test_a_fall_that_the_autopilot_takes_for_a_landing_is_killed_and_deployed(
-    armed,
-):
+def test_a_fall_that_the_autopilot_takes_for_a_landing_is_killed_and_deployed(armed):
     story = aloft()
     story.fall(3.5, landed_state=GROUND, armed=armed)
     assert story.fired() == ["KILL", "DEPLOY"]

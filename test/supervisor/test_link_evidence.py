@@ -247,9 +247,7 @@ def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(pause, kno
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.sampled_from(LinkState)), max_size=30))
-def test_between_two_heartbeats_a_link_only_gets_worse_or_is_relied_on_after_its_wait(
-    beats,
-):
+def test_between_two_heartbeats_a_link_only_gets_worse_or_is_relied_on_after_its_wait(beats):
     now, evidence = 100.0, LinkEvidence()
     for seq, (wait, said) in enumerate(beats):
         judged = {evidence.judged(LIMITS, now + wait * part) for part in (0.0, 0.3, 0.6, 0.99)}

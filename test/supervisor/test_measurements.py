@@ -349,9 +349,7 @@ AGES = st.one_of(st.floats(), st.floats(0.0, 3.0))
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 2.0), VALUES, AGES), max_size=30))
-def test_what_can_be_used_is_always_young_within_its_range_and_was_told(
-    told,
-):
+def test_what_can_be_used_is_always_young_within_its_range_and_was_told(told):
     now, known, values = 100.0, Measured(), set()
     for wait, value, age in told:
         now += wait

@@ -67,9 +67,7 @@ def test_a_person_may_ask_for_the_kill_alone():
 
 
 @pytest.mark.parametrize("failed", [True, False])
-def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(
-    failed,
-):
+def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(failed):
     """Given an autopilot that refuses the kill, or never answers; it hovers on, and falls."""
     story = Story(shipped("multirotor")).ready().fly(2.0, height=60.0)
     story.at(2.0, i.KillRequest(1, "operator", "flies away", kill_only=True))

@@ -258,13 +258,7 @@ SAYS: tuple[dict[str, Any], ...] = (
     forces=st.lists(st.floats(0.0, 9.0), min_size=2, max_size=8),
 )
 def test_whatever_one_origin_tells_beside_what_an_autopilot_says_it_ends_no_flight(
-    profile,
-    says,
-    lies,
-    sink,
-    pushes,
-    leans,
-    forces,
+    profile, says, lies, sink, pushes, leans, forces
 ):
     """Given a level hover or a slow descent: of estimator, accelerometer and barometer one is
     wrong, in any way. No rule takes it for two signs."""

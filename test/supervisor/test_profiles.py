@@ -242,9 +242,7 @@ def test_with_a_confirmed_kill_it_deploys_at_once(case):
 
 
 @pytest.mark.parametrize("case", DEPLOYS, ids=str)
-def test_over_its_limit_for_just_too_short_or_just_under_it_for_long_it_does_nothing(
-    case,
-):
+def test_over_its_limit_for_just_too_short_or_just_under_it_for_long_it_does_nothing(case):
     story = case.flying()
     case.over_for(story, case.enough() - 2)
     story.fly(story.t + 3.0, 0.1, **case.before)
@@ -352,9 +350,7 @@ def test_a_device_that_asks_for_a_kill_gets_it_in_any_state(name):
 
 
 @EACH
-def test_an_open_parachute_stops_the_motors_in_flight_and_fires_nothing_on_the_ground(
-    name,
-):
+def test_an_open_parachute_stops_the_motors_in_flight_and_fires_nothing_on_the_ground(name):
     story = Story(shipped(name)).ready()
     story.at(0.1, story.heartbeat(), parachute(deployed=True))
     assert story.fired() == []
@@ -586,9 +582,7 @@ def test_a_lost_link_in_flight_is_an_alarm_and_no_more(name):
 
 
 @pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
-def test_an_autopilot_that_falls_silent_with_everything_else_is_an_alarm_in_its_time(
-    name,
-):
+def test_an_autopilot_that_falls_silent_with_everything_else_is_an_alarm_in_its_time(name):
     story = Story(shipped(name)).ready().fly(1.0)
     story.at(3.9)
     assert alarms(story, "autopilot lost") == 0
@@ -603,9 +597,7 @@ DIVE = {"vertical_speed": -11.0, "tilt": 25.0, "attitude_error": 4.0, "accelerat
 
 
 @pytest.mark.parametrize("before", [{"battery_remaining": 0.0}, REBOOTED])
-def test_a_dive_that_is_commanded_is_no_fall_beside_an_empty_battery_or_a_restart(
-    before,
-):
+def test_a_dive_that_is_commanded_is_no_fall_beside_an_empty_battery_or_a_restart(before):
     story = Story(shipped("fixed_wing")).ready().fly(2.0, height=120.0)
     story.fly(3.0, height=120.0, **before)
     height = 120.0

@@ -52,9 +52,7 @@ def test_the_same_over_level_ground_is_killed_and_no_more():
 
 
 @pytest.mark.parametrize("before", [0.0, 0.1, 0.3])
-def test_what_denied_it_and_falls_silent_a_moment_before_all_else_releases_nothing(
-    before,
-):
+def test_what_denied_it_and_falls_silent_a_moment_before_all_else_releases_nothing(before):
     """Given a vehicle that tipped over at 5 m and lies on the ground, whose estimator takes itself
     to sink slowly at 19 m, and whose barometer knows better; when its autopilot is heard no more,
     and of it the barometer was heard last a little before (a recorded flight ends so)."""

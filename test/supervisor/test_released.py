@@ -39,9 +39,7 @@ def why(story: Story) -> str:
 
 
 @pytest.mark.parametrize("start", [Story().ready, armed])
-def test_one_that_is_released_past_the_supervisor_on_the_ground_blocks_until_a_reset(
-    start,
-):
+def test_one_that_is_released_past_the_supervisor_on_the_ground_blocks_until_a_reset(start):
     story = start()
     on(story, 1.0, parachute(deployed=True))
     assert story.state.stage is Stage.BLOCKED

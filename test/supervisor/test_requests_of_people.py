@@ -190,9 +190,7 @@ def test_a_vehicle_that_takes_off_while_it_is_armed_is_in_flight():
 
 
 @pytest.mark.parametrize("given", [ready, flying])
-def test_a_kill_leaves_at_once_and_is_answered_once_at_its_confirmation(
-    given,
-):
+def test_a_kill_leaves_at_once_and_is_answered_once_at_its_confirmation(given):
     story = given()
     story.at(1.0, i.KillRequest(1, "upf operator", "stop"))
     assert story.when(K) == 1.0

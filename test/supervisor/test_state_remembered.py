@@ -61,12 +61,7 @@ def test_a_decision_has_got_as_far_as_the_best_link(outcomes, reached):
         ({"a": {Outcome.CONFIRMED, Outcome.FAILED}, "b": {Outcome.FAILED}}, False, (), (UPF,)),
     ],
 )
-def test_who_has_failed_or_not_reported_or_not_begun(
-    outcomes,
-    failed,
-    unreported,
-    not_begun,
-):
+def test_who_has_failed_or_not_reported_or_not_begun(outcomes, failed, unreported, not_begun):
     one = pending(**outcomes)
     assert one.all_failed() is failed
     assert one.unreported() == unreported

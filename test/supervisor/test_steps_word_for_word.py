@@ -98,9 +98,7 @@ def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone():
     "known",
     [{"leading": False}, {"mode": i.Mode.INHIBITED}, {"stage": Stage.KILLING}, {"kill": None}],
 )
-def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(
-    known,
-):
+def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(known):
     one = steps(**{"stage": Stage.DEPLOYING, "kill": decided(1, K), **known})
     fire(one, D, "tested", ("why",))
     assert one.outputs == []

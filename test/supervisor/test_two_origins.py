@@ -162,9 +162,7 @@ def test_heights_that_differ_as_weather_and_warmth_make_them_are_not():
 
 @settings(max_examples=25)
 @given(st.lists(st.floats(-8.0, 8.0), min_size=3, max_size=6))
-def test_whatever_an_estimator_tells_on_the_ground_nothing_is_released(
-    pushes,
-):
+def test_whatever_an_estimator_tells_on_the_ground_nothing_is_released(pushes):
     teller, height, speed = told_to("multirotor"), 0.0, 0.0
     teller.stand(1.0, true_height=0.0)
     flies = {key: value for key, value in DOWN.items() if key not in ("landed_state", "armed")}

@@ -50,9 +50,7 @@ def rate(*heights: float, every: float = 0.1) -> tuple[float, str]:
 
 
 @pytest.mark.parametrize("acceleration", [-9.81, 0.0, 50.0, 100.0])
-def test_a_climb_rate_that_changes_as_a_vehicle_does_is_none_that_scatters(
-    acceleration,
-):
+def test_a_climb_rate_that_changes_as_a_vehicle_does_is_none_that_scatters(acceleration):
     way = [acceleration / 2.0 * (step * 0.1) ** 2 for step in range(11)]
     value, why = rate(*way)
     assert why == ""
