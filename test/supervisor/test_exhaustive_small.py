@@ -174,10 +174,12 @@ def test_on_the_ground_no_sequence_without_a_person_fires_anything(before):
 
 def test_whatever_came_before_one_that_falls_in_flight_is_killed_at_once():
     """Every two letters before; then it falls in earnest."""
+    *_, (_, flies) = beginnings()
     for first in MORE.values():
+        begun = flies.copy()
+        first(begun)
         for second in MORE.values():
-            _, watch = list(beginnings())[2]
-            first(watch)
+            watch = begun.copy()
             second(watch)
             if watch.state.stage is not Stage.IN_FLIGHT or watch.state.mode is not i.Mode.ACTIVE:
                 continue
