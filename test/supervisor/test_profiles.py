@@ -265,9 +265,9 @@ def test_over_its_limit_for_long_enough_it_warns_once_and_fires_nothing(case):
 def test_just_under_its_limit_or_for_too_short_it_does_not_warn(case):
     story = case.flying()
     case.over_for(story, case.enough() - 2)
-    story.fly(
-        story.t + 3 * case.hold + 2.0, max(EVERY, case.hold / 50), **{**case.before, **case.under}
-    )
+    told = {**case.before, **case.under}
+    story.fly(story.t + EVERY, EVERY, **told)
+    story.fly(story.t + 3 * case.hold + 2.0, max(EVERY, case.hold / 50), **told)
     assert alarms(story, case.rule) == 0
     assert story.fired() == []
 
