@@ -25,7 +25,7 @@ from chute_ros.links.upf.simulator.sim_upf import _parameters
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = sorted(LAUNCH.glob("*.launch.py"))
+SIMULATION, VEHICLE = FILES = sorted(LAUNCH.glob("*.launch.py"))
 EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 
@@ -95,15 +95,14 @@ def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
 
 
 def test_the_simulation_stays_on_this_host():
-    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    variables = calls(simulation, "SetEnvironmentVariable")
+    variables = calls(SIMULATION, "SetEnvironmentVariable")
     set_to = {variable[0]: variable[1] for variable in variables}
     assert set_to["'ROS_AUTOMATIC_DISCOVERY_RANGE'"] == "'LOCALHOST'"
-    (variable,) = calls(simulation, "UnsetEnvironmentVariable")
+    (variable,) = calls(SIMULATION, "UnsetEnvironmentVariable")
     assert variable[0] == "name"
-    assert "for name in LEADS_ELSEWHERE" in simulation.read_text()
+    assert "for name in LEADS_ELSEWHERE" in SIMULATION.read_text()
     assert {"ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"} < set(LEADS_ELSEWHERE)
-    assert "0.0.0.0" not in simulation.read_text()
+    assert "0.0.0.0" not in SIMULATION.read_text()
 
 
 def test_the_simulators_take_the_options_that_are_given_to_them():
@@ -123,7 +122,7 @@ def test_the_simulators_take_the_options_that_are_given_to_them():
 
 def nodes_of(monkeypatch, **given):
     """What vehicle.launch.py starts: executable -> with what."""
-    made = made_by(LAUNCH / "vehicle.launch.py", monkeypatch, **given)
+    made = made_by(VEHICLE, monkeypatch, **given)
     return {one.options["executable"]: one.options for one in made if "executable" in one.options}
 
 
@@ -249,9 +248,7 @@ def test_a_wrong_link_ends_the_launch_in_one_line(another, monkeypatch, capsys):
 
 def test_a_simulation_gives_the_vehicle_the_file_that_is_given(monkeypatch):
     for given in ("", "/tmp/mine.yaml"):
-        made = made_by(
-            LAUNCH / "simulation.launch.py", monkeypatch, parachute="mavlink", config=given
-        )
+        made = made_by(SIMULATION, monkeypatch, parachute="mavlink", config=given)
         (included,) = [one for one in made if type(one).__name__ == "IncludeLaunchDescription"]
         assert dict(included.options["launch_arguments"])["config"] == given
 
@@ -267,7 +264,7 @@ LINK = replace(""",
     ).replace("    package=", "    simulators=simulators, package=")
     another(code=code)
     with pytest.raises(SystemExit):
-        made_by(LAUNCH / "simulation.launch.py", monkeypatch, parachute="other", fail="motor@5")
+        made_by(SIMULATION, monkeypatch, parachute="other", fail="motor@5")
     assert capsys.readouterr().err == (
         "simulation.launch.py: fail is 'motor@5': nothing can fail in a vehicle with sim_motor: "
         "leave fail out\n"
@@ -294,16 +291,15 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     made = made_by(file, monkeypatch, parachute=parachute, namespace="drone1")
     names = {one.options.get("executable") or one.options.get("name") for one in made}
     nodes, simulators = STARTED[parachute]
-    vehicle = file.name.startswith("vehicle")
-    assert names - {None} == ({*nodes, "safety_supervisor"} if vehicle else simulators)
-    if vehicle:
+    assert names - {None} == ({*nodes, "safety_supervisor"} if file == VEHICLE else simulators)
+    if file == VEHICLE:
         started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
 
 
 def exits_of(name, monkeypatch):
     """What vehicle.launch.py does as its node name exits, by exit code."""
-    made = made_by(LAUNCH / "vehicle.launch.py", monkeypatch, parachute="mavlink")
+    made = made_by(VEHICLE, monkeypatch, parachute="mavlink")
     (node,) = [one for one in made if one.options.get("executable") == name]
     return lambda code: node.options["on_exit"](SimpleNamespace(returncode=code), None)
 
@@ -360,8 +356,7 @@ def test_a_vehicle_is_heard_on_its_own_computer_unless_it_is_said_otherwise(
         monkeypatch.delenv(name, raising=False)
     for name, value in given.items():
         monkeypatch.setenv(name, value)
-    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
-    space = loaded(vehicle, monkeypatch)
+    space = loaded(VEHICLE, monkeypatch)
     Recorded.made.clear()
     space["generate_launch_description"]()
     (argument,) = [one for one in Recorded.made if one.args[:1] == ("range",) and one.options]
@@ -373,15 +368,13 @@ def test_the_range_is_of_the_vehicles_nodes_alone(monkeypatch):
     nodes = nodes_of(monkeypatch, parachute="mavlink", range="SUBNET")
     for node in nodes.values():
         assert node["additional_env"] == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
-    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
-    assert "SetEnvironmentVariable" not in vehicle.read_text()
+    assert "SetEnvironmentVariable" not in VEHICLE.read_text()
 
 
 @pytest.mark.parametrize("parachute", ["upf", "both"])
 def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
     """As delivered it arms by itself, and rejects who tells it to."""
-    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    made = made_by(simulation, monkeypatch, parachute=parachute, namespace="sim")
+    made = made_by(SIMULATION, monkeypatch, parachute=parachute, namespace="sim")
     (upf,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_upf"]
     given = [after for before, after in itertools.pairwise(upf) if before == "--parameter"]
     values = {**CONTROLLER_PARAMETERS, **_parameters(given)}
@@ -391,9 +384,8 @@ def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
 def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(
     folder, monkeypatch
 ):
-    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     given = {"parachute": "mavlink", "fly": "60", "fail": "refuse@0,motor@15", "wind": "5"}
-    made = made_by(simulation, monkeypatch, **given)
+    made = made_by(SIMULATION, monkeypatch, **given)
     commands = {one.options["name"]: one.options["cmd"] for one in made if "cmd" in one.options}
     (bench,) = [one for one in made if one.options.get("executable") == "sim_bench"]
     (parameters,) = bench.options["parameters"]
@@ -410,7 +402,7 @@ def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(
 def test_what_a_simulated_vehicle_keeps_is_of_that_run_alone(folder, monkeypatch):
     """A run before it left the vehicle without its parachute: the next one never took off. And a
     real vehicle may have the same namespace."""
-    made = made_by(LAUNCH / "simulation.launch.py", monkeypatch, parachute="mavlink")
+    made = made_by(SIMULATION, monkeypatch, parachute="mavlink")
     (variable,) = [one for one in made if one.args[:1] == ("ROS_HOME",)]
     home = Path(variable.args[1])
     assert home.parent == folder / "chute_ros" / "simulations"
@@ -419,16 +411,6 @@ def test_what_a_simulated_vehicle_keeps_is_of_that_run_alone(folder, monkeypatch
     first, *others = group.args[0]
     assert first is variable
     assert {type(one).__name__ for one in others} >= {"IncludeLaunchDescription", "Node"}
-
-
-def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys):
-    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    with pytest.raises(SystemExit) as ended:
-        made_by(simulation, monkeypatch, parachute="umbilical", fly="60")
-    assert ended.value.code == 2
-    told = capsys.readouterr().err
-    assert told.startswith("simulation.launch.py: fly is '60': need a vehicle with sim_autopilot")
-    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -443,10 +425,9 @@ def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys
 def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(
     pushed, namespace, place, monkeypatch
 ):
-    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
     given = {"parachute": "both", "namespace": namespace, "pushed": pushed}
     for enclaves in ("true", "false"):
-        made = made_by(vehicle, monkeypatch, **given, enclaves=enclaves)
+        made = made_by(VEHICLE, monkeypatch, **given, enclaves=enclaves)
         nodes = [one.options for one in made if "executable" in one.options]
         assert len(nodes) == 3
         for node in nodes:
@@ -456,13 +437,9 @@ def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(
 
 def test_the_action_is_started_beside_the_supervisor_if_asked_for(monkeypatch):
     """It takes no file: it has no parameters."""
-    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
     for asked, more in (("true", ["deploy_action"]), ("false", []), ("", [])):
         given = {"parachute": "mavlink", "namespace": "drone1", "deploy_action": asked}
-        made = made_by(vehicle, monkeypatch, **given)
-        nodes = {
-            one.options["executable"]: one.options for one in made if "executable" in one.options
-        }
+        nodes = nodes_of(monkeypatch, **given)
         assert list(nodes) == ["mavlink_parachute", "safety_supervisor", *more]
         for name in more:
             assert (nodes[name]["namespace"], nodes[name]["parameters"]) == ("drone1", [])
