@@ -85,7 +85,7 @@ def test_a_file_cut_at_any_byte_has_what_was_flushed_before(tmp_path):
     path = tmp_path / "one.mcap"
     file = McapFile(path, {"beat": TOPICS["beat"]})
     flushed = [(file.size, 0)]
-    for number in range(1, 5):
+    for number in (1, 2):
         for _ in range(number):
             file.write("beat", beat(number), number)
         file.flush()
@@ -97,7 +97,7 @@ def test_a_file_cut_at_any_byte_has_what_was_flushed_before(tmp_path):
         cut.write_bytes(data[:end])
         sure = max(messages for size, messages in flushed if size <= end)
         assert count(cut) >= sure, f"cut at {end}"
-    assert count(cut) == 10
+    assert count(cut) == 3
 
 
 def test_what_was_not_flushed_is_not_missed_by_what_was(tmp_path):
