@@ -31,6 +31,9 @@ from chute_ros.runtime.topics import (
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.lease import Claim
 
+MessageT = TypeVar("MessageT")
+EnumT = TypeVar("EnumT", bound=enum.IntEnum)
+
 
 def seconds(stamp: Time) -> float:
     """A stamp as Unix seconds."""
@@ -49,17 +52,7 @@ def before(stamp: Time, age: float) -> Time:
 
 def device_beat(one: DeviceBeat, stamp: Time) -> LinkHeartbeat:
     """As it is published on safety/heartbeat."""
-    message = LinkHeartbeat(
-        link=one.link,
-        link_state=int(one.link_state),
-        device_healthy=one.device_healthy,
-        seq=one.seq,
-        reasons=list(one.reasons),
-        age=one.age,
-        behind=one.behind,
-    )
-    message.header.stamp = stamp
-    return message
+    return _filled(LinkHeartbeat(), one, stamp)
 
 
 def device_beat_from(message: LinkHeartbeat) -> DeviceBeat:
@@ -78,19 +71,7 @@ def device_beat_from(message: LinkHeartbeat) -> DeviceBeat:
 
 def action_told(told: ActionTold, stamp: Time) -> ActionReport:
     """As it is published on safety/action."""
-    report = told.report
-    message = ActionReport(
-        epoch=report.epoch,
-        id=report.id,
-        action=int(told.action),
-        outcome=int(report.outcome),
-        link=report.link,
-        detail=report.detail,
-        newest_epoch=report.newest_epoch,
-        newest_id=report.newest_id,
-    )
-    message.header.stamp = stamp
-    return message
+    return _filled(ActionReport(action=int(told.action)), told.report, stamp)
 
 
 def action_told_from(message: ActionReport) -> ActionTold:
@@ -145,21 +126,10 @@ def stamp_of(nanoseconds: int) -> Time:
 
 def lease_claim(told: LeaseClaim, stamp: Time) -> SupervisorLease:
     """As it is published on safety/lease."""
-    claim = told.claim
     message = SupervisorLease(
-        name=claim.name,
-        instance=told.instance,
-        running=told.running,
-        rank=claim.rank,
-        epoch=claim.epoch,
-        leading=claim.leading,
-        empty=claim.empty,
-        links_heard=claim.links_heard,
-        leader=told.leader,
-        state=told.state,
+        instance=told.instance, running=told.running, leader=told.leader, state=told.state
     )
-    message.header.stamp = stamp
-    return message
+    return _filled(message, told.claim, stamp)
 
 
 def lease_claim_from(message: SupervisorLease) -> LeaseClaim:
@@ -177,16 +147,12 @@ def lease_claim_from(message: SupervisorLease) -> LeaseClaim:
 
 def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> ParachuteStatus:
     """As it is published on parachute/status."""
-    message = ParachuteStatus(link=link)
-    message.header.stamp = stamp
-    _fill(message, status)
-    return message
+    return _filled(ParachuteStatus(link=link), status, stamp)
 
 
 def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
     """As it is published on vehicle/state. stamp: when the picture was made."""
-    message = VehicleState()
-    _fill(message, state)
+    message = _filled(VehicleState(), state, Time())
     known = [age for age in (getattr(state, name) for name in model.AGES) if not math.isnan(age)]
     if known:
         message.header.stamp = before(stamp, min(known))
@@ -217,12 +183,7 @@ def parachute_from(message: ParachuteStatus) -> model.ParachuteStatus:
 
 def decision(one: model.Decision, stamp: Time) -> SafetyDecision:
     """As it is published on safety/decision."""
-    message = SafetyDecision()
-    message.header.stamp = stamp
-    message.epoch, message.id, message.action = one.epoch, one.id, int(one.action)
-    message.rule, message.shadow, message.device = one.rule, one.shadow, one.device
-    message.reasons, message.targets = list(one.reasons), list(one.targets)
-    return message
+    return _filled(SafetyDecision(), one, stamp)
 
 
 def decision_from(message: SafetyDecision) -> model.Decision:
@@ -259,11 +220,16 @@ def answered(service: str, request: Any, response: Any) -> str:
     return f"{service}({request_words(request)}) answered: {response.message}"
 
 
-def _fill(message: Any, one: model.ParachuteStatus | model.VehicleState) -> None:
-    """Of each field of one that of its name in message."""
+def _filled(message: MessageT, one: Any, stamp: Time) -> MessageT:
+    """With this stamp, and with each field of one in that of its name."""
+    filled: Any = message
+    filled.header.stamp = stamp
     for field in dataclasses.fields(one):
         value = getattr(one, field.name)
-        setattr(message, field.name, int(value) if isinstance(value, enum.Enum) else value)
+        if isinstance(value, (enum.IntEnum, enum.IntFlag)):
+            value = int(value)
+        setattr(filled, field.name, list(value) if isinstance(value, tuple) else value)
+    return message
 
 
 def _values(
@@ -274,9 +240,6 @@ def _values(
     values["link_state"] = _known(model.LinkState, values["link_state"])
     values["faults"] = tuple(values["faults"])
     return values
-
-
-EnumT = TypeVar("EnumT", bound=enum.IntEnum)
 
 
 def _known(kind: type[EnumT], number: int) -> EnumT:
