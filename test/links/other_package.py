@@ -37,13 +37,11 @@ def changed(old, new):
     return OTHERS.replace(old, new)
 
 
-def python(code, folder, first=True):
-    """Run code in a Python of its own; first: folder is looked at before all others."""
-    path = list(filter(None, sys.path))
-    path = os.pathsep.join([str(folder), *path] if first else [*path, str(folder)])
+def python(code, folder):
+    """Run code in a Python of its own, which looks at this folder before all others."""
     return subprocess.run(
         [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *filter(None, sys.path)])},
         capture_output=True,
         text=True,
         check=False,

@@ -1,9 +1,10 @@
 """A link is found by its entry: ours, and one of somebody's own package."""
 
 import ast
+import importlib
 import inspect
-import json
-from importlib import import_module
+import sys
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -39,13 +40,13 @@ def test_what_it_names_is_there(name):
 
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_its_protocol_is_a_link(folder):
-    module = import_module(f"chute_ros.links.{folder}.protocol.link")
+    module = importlib.import_module(f"chute_ros.links.{folder}.protocol.link")
     (made,) = [
         one
         for one in vars(module).values()
         if inspect.isclass(one) and one.__module__ == module.__name__ and "Link" in one.__name__
     ]
-    runtimes = vars(import_module(f"chute_ros.links.{folder}.runtime")).values()
+    runtimes = vars(importlib.import_module(f"chute_ros.links.{folder}.runtime")).values()
     (runtime,) = [
         one
         for one in runtimes
@@ -88,31 +89,44 @@ def test_each_vehicle_carries_links_that_there_are():
             assert {*vehicle.supervised(name)} <= {*vehicle.links}, (vehicle.name, name)
 
 
-TELL = """
-import json
-from chute_ros.links.registered import links, module_of, vehicles
-print(json.dumps([list(links()), list(vehicles()), module_of("rocket_motor")]))
-"""
+@contextmanager
+def installed(folder, first=True):
+    """As in a program that has the packages of this folder; first: before all others."""
+    with pytest.MonkeyPatch.context() as patch:
+        path = [str(folder), *sys.path] if first else [*sys.path, str(folder)]
+        patch.setattr(sys, "path", path)
+        patch.setattr(registered, "entry_points", entry_points)
+        importlib.invalidate_caches()
+        read_anew()
+        try:
+            yield
+        finally:
+            sys.modules.pop("other_link", None)
+            read_anew()
+
+
+def read_anew():
+    links.cache_clear()
+    vehicles.cache_clear()
 
 
 def test_a_link_of_another_package_is_found_behind_ours(tmp_path):
-    other_package(tmp_path, "rocket_motor = other_link:LINK")
-    done = python(TELL, tmp_path)
-    assert done.returncode == 0, done.stderr
-    names, carried, module = json.loads(done.stdout)
-    assert names[: len(links())] == [*links()]
-    assert carried[: len(vehicles())] == [*vehicles()]
+    ours = [*links()], [*vehicles()]
+    other_package(tmp_path)
+    with installed(tmp_path):
+        names, carried, module = [*links()], [*vehicles()], module_of("rocket_motor")
+    assert names[: len(ours[0])] == ours[0]
+    assert carried[: len(ours[1])] == ours[1]
     assert "rocket_motor" in names
     assert "other" in carried
     assert module == "other_link"
 
 
-def refused(folder, code, tell=TELL, entry="rocket_motor = other_link:LINK"):
-    """What is said once a program has met the link of this code."""
-    other_package(folder, entry, code)
-    done = python(tell, folder)
-    assert done.returncode == 1, done.stdout
-    return done.stderr.splitlines()[-1]
+def refusal(folder, first=True):
+    """What is said once a program has met the links of this folder."""
+    with installed(folder, first), pytest.raises(NotRegisteredError) as raised:
+        vehicles()
+    return str(raised.value)
 
 
 MAVLINK = "chute_ros.links mavlink_parachute = chute_ros.links.mavlink:LINK"
@@ -148,12 +162,9 @@ def test_a_name_that_is_taken_is_refused_with_both_owners_wherever_they_are_on_t
     kind, _, name = what.rpartition(" ")
     entry = f"{name if kind == 'node' else 'rocket_motor'} = other_link:LINK"
     other_package(tmp_path, entry, changed(old, new))
-    done = python(TELL, tmp_path, first)
-    assert done.returncode == 1, done.stdout
-    said = done.stderr.splitlines()[-1].partition("NotRegisteredError: ")[2]
     theirs = f"chute_ros.links {entry}"
     end = "give one of them another name, or remove its package"
-    assert said in {
+    assert refusal(tmp_path, first) in {
         f"{one}: the {what} is also that of {other}: {end}"
         for one, other in ((theirs, whose), (whose, theirs))
     }
@@ -161,8 +172,8 @@ def test_a_name_that_is_taken_is_refused_with_both_owners_wherever_they_are_on_t
 
 def test_an_entry_that_is_found_twice_is_one_link(tmp_path):
     other_package(tmp_path, "relay = chute_ros.links.relay:LINK")
-    done = python("from chute_ros.links.registered import links; print(*links())", tmp_path)
-    assert done.stdout.split().count("relay") == 1, done.stderr
+    with installed(tmp_path):
+        assert [*links()].count("relay") == 1
 
 
 @pytest.mark.parametrize(
@@ -197,26 +208,24 @@ def test_an_entry_that_is_found_twice_is_one_link(tmp_path):
     ],
 )
 def test_a_vehicle_that_names_what_is_not_there_is_refused(tmp_path, old, new, said):
-    told = refused(tmp_path, changed(old, new))
-    assert "NotRegisteredError: vehicle other of other_package: " + said in told
+    other_package(tmp_path, code=changed(old, new))
+    assert f"vehicle other of other_package: {said}" in refusal(tmp_path)
 
 
 def test_a_place_that_is_not_there_is_named_to_who_needs_it(tmp_path):
     code = changed("    package=", '    parameters="other_link.none:Settings", package=')
-    tell = (
-        "from chute_ros.links.api import load; from chute_ros.links.registered import links; "
-        "load(links()['rocket_motor'].parameters)"
+    other_package(tmp_path, code=code)
+    with installed(tmp_path), pytest.raises(NotRegisteredError) as raised:
+        load(links()["rocket_motor"].parameters)
+    assert str(raised.value) == (
+        "other_link.none:Settings, which a link names, cannot be imported: No module named "
+        "'other_link.none': correct the place in its LinkKind, or install what it needs"
     )
-    assert (
-        "NotRegisteredError: other_link.none:Settings, which a link names, cannot be imported: "
-        "No module named 'other_link.none': correct the place in its LinkKind, or install "
-        "what it needs"
-    ) in refused(tmp_path, code, tell)
 
 
 def test_a_campaign_with_a_part_that_is_not_there_ends_in_one_line(tmp_path):
     code = changed("    package=", '    part="other_link.none:Part", package=')
-    other_package(tmp_path, "rocket_motor = other_link:LINK", code)
+    other_package(tmp_path, code=code)
     tell = (
         "import sys; sys.argv = ['campaign', '--flights', '1']; "
         "from chute_ros.tools.campaign import main; main()"
@@ -228,7 +237,7 @@ def test_a_campaign_with_a_part_that_is_not_there_ends_in_one_line(tmp_path):
 
 
 def test_a_tool_that_is_started_beside_a_wrong_link_ends_in_one_line(tmp_path):
-    other_package(tmp_path, "rocket_motor = other_link:LINK", changed('"other"', '"mavlink"'))
+    other_package(tmp_path, code=changed('"other"', '"mavlink"'))
     tell = "import sys; from chute_ros.tools.{0} import main; sys.argv = ['{0}', '--help']; main()"
     for tool in ("campaign", "sim"):
         done = python(tell.format(tool), tmp_path)
@@ -238,11 +247,8 @@ def test_a_tool_that_is_started_beside_a_wrong_link_ends_in_one_line(tmp_path):
 
 
 def test_the_defaults_of_a_node_need_no_settings_of_another(tmp_path):
-    other_package(
-        tmp_path,
-        "rocket_motor = other_link:LINK",
-        changed("    package=", '    parameters="other_link.none:Settings", package='),
-    )
+    code = changed("    package=", '    parameters="other_link.none:Settings", package=')
+    other_package(tmp_path, code=code)
     tell = (
         "from chute_ros.tools.chute.parameter_list import defaults_for as told; "
         "from chute_ros.tools.parameter_docs import NODES\n"
@@ -263,7 +269,7 @@ def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(tmp_
         "Shipped(Path()).read_all(); print([draw(n) for n in range(50)])"
     )
     (tmp_path / "without").mkdir()
-    other_package(tmp_path, "rocket_motor = other_link:LINK", code)
+    other_package(tmp_path, code=code)
     beside, alone = python(tell, tmp_path), python(tell, tmp_path / "without")
     assert alone.returncode == 0, alone.stderr
     assert (beside.returncode, beside.stdout) == (0, alone.stdout), beside.stderr
@@ -281,21 +287,14 @@ def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(tmp_
 )
 def test_an_entry_that_is_none_is_named(tmp_path, entry, said):
     other_package(tmp_path, entry)
-    done = python(TELL, tmp_path)
-    assert done.returncode == 1
-    (line,) = [one for one in done.stderr.splitlines() if "NotRegisteredError: " in one]
-    assert said in line
+    assert said in refusal(tmp_path)
 
 
 def test_without_any_it_says_what_to_do(monkeypatch):
     monkeypatch.setattr(registered, "entry_points", lambda group: ())
-    links.cache_clear()
-    try:
-        with pytest.raises(NotRegisteredError, match=r"build chute_ros and source install/setup"):
-            links()
-    finally:
-        monkeypatch.undo()
-        links.cache_clear()
+    read_anew()
+    with pytest.raises(NotRegisteredError, match=r"build chute_ros and source install/setup"):
+        links()
 
 
 def test_a_kind_is_made_of_texts_and_functions_alone():
