@@ -1,10 +1,7 @@
 """Parameters of upf_can: a bad value stops the start, and is named with what is allowed."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,10 +12,7 @@ from chute_ros.errors import ParameterError
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.links.upf.parameters import PARAMETERS
 
-NAN, INF = float("nan"), float("inf")
 DSDL = Path(__file__).parents[3] / "msg_defs" / "dsdl" / "flyfire"
-RANGED = [one for one in PARAMETERS if one.minimum is not None]
-OTHERS = [one for one in PARAMETERS if one.minimum is None]
 
 
 def start(bench, **parameters):
@@ -48,46 +42,6 @@ def test_each_has_the_default_that_its_table_says(bench, monkeypatch, tmp_path):
         assert described.description == one.meaning
         assert described.additional_constraints == one.allowed()
         assert described.read_only != one.changeable
-
-
-def outside(one):
-    """Values just beyond the range, and what is no number of its kind."""
-    if isinstance(one.default, int):
-        return [int(one.minimum) - 1, int(one.maximum) + 1, 1.5, "1", True]
-    return [one.minimum - 1e-3, one.maximum * 1.001, NAN, INF, -INF, 1, "1.0", False]
-
-
-def refused_with_what_is_allowed(bench, one, value):
-    text = refusal(bench, **{one.name: value})
-    assert f"parameter {one.name} of " in text
-    assert f" is {value!r}: need {one.allowed()}" in text
-
-
-@pytest.mark.parametrize("one", RANGED, ids=lambda one: one.name)
-def test_a_value_outside_the_range_is_named_with_the_range_whose_ends_are_taken(bench, one):
-    for value in outside(one):
-        refused_with_what_is_allowed(bench, one, value)
-    kind = type(one.default)
-    ends = {kind(one.minimum), kind(one.maximum)}
-    others = {}
-    if one.name == "device_stale_after":
-        ends, others = ends - {600.0}, {"device_lost_after": 600.0}
-    if one.name == "device_lost_after":
-        ends, others = ends - {0.05}, {"device_stale_after": 0.05}
-    for value in ends:
-        node = start(bench, **others, **{one.name: value})
-        assert node.values[one.name] == value
-        bench.remove(node)
-
-
-@pytest.mark.parametrize("one", OTHERS, ids=lambda one: one.name)
-def test_a_value_of_another_kind_is_named_with_what_is_needed(bench, one):
-    wrong = ["yes", 1, 1.0] if isinstance(one.default, bool) else [1, 1.0, True, ["x"]]
-    if one.takes_switch:
-        wrong = [value for value in wrong if value is not True]
-    wrong += ["Forward", "", "forward "] if one.choices else []
-    for value in wrong:
-        refused_with_what_is_allowed(bench, one, value)
 
 
 def test_a_bus_that_is_none_is_named_with_the_forms(bench):
@@ -206,46 +160,3 @@ def test_types_that_lack_what_fires_are_refused_with_the_list(
     assert f"flyfire.{file.partition('.')[2]}" in text
     for one in lacking:
         assert one in text
-
-
-# A process of its own
-
-
-COMMAND = [sys.executable, "-m", "chute_ros.links.upf", "--ros-args"]
-
-
-def run(namespace, tmp_path, *parameters):
-    """A real process: its exit code and stderr."""
-    words = [word for parameter in parameters for word in ("-p", parameter)]
-    done = subprocess.run(
-        [*COMMAND, "-r", f"__ns:={namespace}", *words],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-        env={**os.environ, "ROS_HOME": str(tmp_path)},
-    )
-    return done.returncode, done.stderr
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["node_id:=0"], "parameter node_id of {ns}/upf_can is 0: need a whole number from 1 to"),
-        (["connection:=can"], "connection 'can' is not understood: need mcast:BUS[:PORT]"),
-        (["dsdl_path:=/none"], "parameter dsdl_path is '/none': there is no such folder"),
-        (
-            ["node_id:=33", "controller_node_id:=33"],
-            "parameter controller_node_id is 33 and node_id is 33: ",
-        ),
-        (["allocation_table_file:={tmp}/bad"], "{tmp}/bad cannot be used: it holds no table"),
-    ],
-)
-def test_a_real_start_ends_in_one_line(namespace, tmp_path, given, said):
-    (tmp_path / "bad").write_text("[7]")
-    names = {"ns": namespace, "tmp": tmp_path}
-    code, text = run(namespace, tmp_path, *(one.format(**names) for one in given))
-    assert code == 2
-    (line,) = text.splitlines()
-    assert line.startswith("upf_can: ")
-    assert said.format(**names) in line
