@@ -5,7 +5,7 @@ import time
 
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyDecision
-from chute_msgs.srv import Arm, Deploy, GetNodeInfo
+from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from node_bench import stamped
 from upf_bench import Devices, Network, fly, tasks, values
@@ -29,18 +29,6 @@ FORGIVING = {
     "give_up_after": 15.0,
     "last_resort_after": 10.0,
 }
-FAULTS = {
-    "loss": CanFaultKnobs(loss=0.3),
-    "duplicates": CanFaultKnobs(duplicate=0.3),
-    "reordering": CanFaultKnobs(reorder=0.3),
-    "delay": CanFaultKnobs(delay=0.02),
-    "corruption": CanFaultKnobs(corrupt=0.1),
-    "toggle": CanFaultKnobs(toggle=0.1),
-    "half": CanFaultKnobs(half=0.3),
-    "all": CanFaultKnobs(
-        loss=0.1, duplicate=0.1, reorder=0.1, corrupt=0.02, toggle=0.05, half=0.1, delay=0.005
-    ),
-}
 
 
 class Spoiled:
@@ -57,46 +45,17 @@ class Spoiled:
             "the controller is heard",
         )
 
-    def check_nothing_broke(self):
-        assert self.network.node._loop_faults == 0, "no exception in the link's thread"
 
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_a_forced_deploy_gets_through_what_happens_to_frames(bench, name):
-    spoiled = Spoiled(bench, FAULTS[name])
+def test_a_forced_deploy_gets_through_whatever_happens_to_frames(bench):
+    """Each fault alone, in virtual time: protocol/test_upf_spoiled_bus.py."""
+    knobs = CanFaultKnobs(
+        loss=0.1, duplicate=0.1, reorder=0.1, corrupt=0.02, toggle=0.05, half=0.1, delay=0.005
+    )
+    spoiled = Spoiled(bench, knobs)
     answer = bench.call(Deploy, "upf_can/deploy", force=True, reason="a test")
     assert answer.success, answer.message
     assert spoiled.trigger.fired
-    assert set(spoiled.controller.came) <= {"TYPE_DEPLOY_FORCE", ""}
-    spoiled.check_nothing_broke()
-
-
-#: What a transfer of nine frames may have to go through; on a bus, its frames stay in order.
-LONG = {
-    "loss": CanFaultKnobs(loss=0.05),
-    "duplicates": CanFaultKnobs(duplicate=0.3),
-    "corruption": CanFaultKnobs(corrupt=0.05),
-    "toggle": CanFaultKnobs(toggle=0.05),
-    "half": CanFaultKnobs(half=0.3),
-    "all": CanFaultKnobs(loss=0.02, duplicate=0.1, corrupt=0.02, toggle=0.02, half=0.05),
-}
-
-
-@pytest.mark.parametrize("name", LONG)
-def test_long_transfers_get_through_whole_or_not_at_all(bench, name):
-    spoiled = Spoiled(bench, LONG[name])
-
-    def answer():
-        told = bench.call(GetNodeInfo, "upf_can/get_node_info")
-        assert told.success or "no acknowledgement after 7 sends" in told.message
-        return told.success and told
-
-    told = bench.until(answer, "it is answered in the end")
-    assert told.name == "upf.controller"
-    assert told.unique_id == spoiled.controller.settings.unique_id.hex()
-    before = len(spoiled.beats)
-    bench.until(lambda: len(spoiled.beats) >= before + 5, "the heartbeat goes on")
-    spoiled.check_nothing_broke()
+    assert spoiled.network.node._loop_faults == 0, "no exception in the link's thread"
 
 
 def test_duplicates_arm_and_deploy_once(bench):

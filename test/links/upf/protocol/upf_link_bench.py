@@ -38,6 +38,7 @@ from chute_ros.protocol.events import (
     RequestReport,
     SafetyAsk,
 )
+from chute_ros.sim.can_faults import CanFaultyLink
 
 START = 1000.0
 US, CONTROLLER, TRIGGER = NODE_ID, 33, 34
@@ -104,10 +105,17 @@ class Bench:
     """One link; t is seconds since the start of the story.
 
     devices: simulated ones, each with the name that it has here. parameters: of the controller.
+    knobs: what happens to frames between them and the bus.
     """
 
     def __init__(
-        self, layout, devices="controller trigger", parameters=BY_REQUEST, settings=None, **config
+        self,
+        layout,
+        devices="controller trigger",
+        parameters=BY_REQUEST,
+        settings=None,
+        knobs=None,
+        **config,
     ):
         self.layout, self.definitions = layout, layout.definitions
         values = {**CONTROLLER_PARAMETERS, **parameters}
@@ -118,10 +126,11 @@ class Bench:
         self.trigger = UpfTrigger(self.definitions)
         known = {"controller": self.controller, "trigger": self.trigger}
         self.devices = UpfBus([known[name] for name in devices.split()])
+        #: Between the devices and the bus.
+        self.plug = self.devices if knobs is None else CanFaultyLink(self.devices, knobs, seed=1)
         self.link = UpfLink(UpfConfig(**config), layout.types)
         self.t = 0.0
         self.events: list[Any] = []
-        self.said: list[str] = []
         #: What the link sent, as its receivers understand it.
         self.heard: list[tuple[float, ReceivedTransfer]] = []
         #: Whether a frame is lost on its way: (from the link, its bytes).
@@ -175,7 +184,7 @@ class Bench:
             self.link.owner_alive(self.now + 1.0)
         self.link.update(self.now)
         if self.devices.nodes:
-            self.devices.update(self.now)
+            self.plug.update(self.now)
         moved = True
         while moved:
             moved = False
@@ -183,10 +192,10 @@ class Bench:
                 moved = True
                 self._listen(data)
                 if self.devices.nodes and not self.loses(True, data):
-                    self.devices.receive(data, self.now)
+                    self.plug.receive(data, self.now)
             if self.devices.nodes:
-                self.devices.update(self.now)
-            for data in self.devices.take_output():
+                self.plug.update(self.now)
+            for data in self.plug.take_output():
                 moved = True
                 if not self.loses(False, data):
                     self.link.receive(data, self.now)
@@ -275,7 +284,6 @@ class Bench:
     def clear(self):
         self.events.clear()
         self.heard.clear()
-        self.said.clear()
         self.asks.clear()
         self.controller.requests_heard.clear()
         return self
@@ -343,7 +351,7 @@ class Bench:
     # -- inside ----------------------------------------------------------------------------------
 
     def _devices_want(self):
-        return self.devices.next_deadline() if self.devices.nodes else math.inf
+        return self.plug.next_deadline() if self.devices.nodes else math.inf
 
     def _listen(self, data):
         first = min(self._ears)
@@ -355,7 +363,6 @@ class Bench:
     def _collect(self):
         new = self.link.take_events()
         self.events += new
-        self.said += self.devices.take_events()
         for event in new:
             if isinstance(event, KeepTable):
                 self.link.table_kept(event.number, self.now)
