@@ -1,7 +1,8 @@
-"""mavlink_parachute with each kind of autopilot, on real UDP: kill, block, what is said of it."""
+"""Each kind of autopilot: kill, block, what is said of it; in virtual time, or on real UDP."""
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, VehicleState
@@ -10,9 +11,14 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, airborne, do, quick
 from node_bench import LOCAL, port_of, stamped
 
+from chute_ros.links.mavlink.diagnostics import details_of
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.mavlink.protocol.config import KillMethod, MavlinkConfig
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import Action, Outcome
+from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.ros import qos
@@ -26,6 +32,28 @@ KINDS = pytest.mark.parametrize(
 
 def with_settings(kind, **values):
     return replace(kind, parameters={**kind.parameters, **values})
+
+
+class Network:
+    """The link and devices, each of which hears all others, in virtual time."""
+
+    def __init__(self, *devices, **config):
+        self.link, self.devices = MavlinkLink(MavlinkConfig(**config)), devices
+        self.now = max([one.now for one in devices], default=0.0)
+        self.events: list[Any] = []
+
+    def run(self, seconds):
+        for _ in range(round(seconds / 0.01)):
+            self.now += 0.01
+            everybody = (self.link, *self.devices)
+            for one in everybody:
+                one.update(self.now)
+                for frame in one.take_output():
+                    for other in everybody:
+                        if other is not one:
+                            other.receive(frame, self.now)
+            self.events += self.link.take_events()
+        return self
 
 
 class Rig:
@@ -78,14 +106,18 @@ class Rig:
 
 
 @KINDS
-@pytest.mark.parametrize("method", ["auto", "flight_termination", "forced_disarm"])
-def test_a_kill_at_1_3_m_stops_the_motors_and_releases_nothing(bench, kind, method):
-    rig = Rig(bench, airborne(1.3, kind), kill_method=method)
-    rig.report(rig.decide(Action.KILL), Outcome.CONFIRMED)
-    assert not rig.autopilot.model.armed
-    bench.turns(0.3)
-    assert rig.module.releases == []
-    assert not rig.module.deployment
+@pytest.mark.parametrize("method", KillMethod)
+def test_a_kill_at_1_3_m_stops_the_motors_and_releases_nothing(kind, method):
+    autopilot = airborne(1.3, kind)
+    module = Module(ParachuteSettings(armed_triggers=12, ground_cleared="yes"))
+    network = Network(autopilot, module, kill_method=method).run(5.0)
+    network.link.kill(1, network.now)
+    network.run(2.0)
+    (end,) = [one.finished for one in network.events if isinstance(one, RequestFinished)]
+    assert end.success
+    assert not autopilot.model.armed
+    assert module.releases == []
+    assert not module.deployment
 
 
 def test_px4_that_is_terminated_releases_by_itself():
@@ -136,21 +168,15 @@ def test_a_deploy_over_motors_that_turn_says_so_in_its_answer(bench):
 
 
 @KINDS
-def test_diagnostics_say_which_way_a_kill_goes(bench, kind):
-    rig = Rig(bench, Autopilot(kind=kind))
-    rig.settings_read()
-
-    def told():
-        task = rig.task("kill")
-        values = {pair.key: pair.value for pair in task.values} if task else {}
-        known = {name: f"{value:g}" for name, value in kind.parameters.items()}
-        return task if values.items() >= known.items() else None
-
-    task = bench.until(told, "the settings are told")
-    assert "forced disarm" in task.message
-    assert ("only once a deploy is decided" in task.message) is (kind in (GENERIC, PX4))
-    assert task.level != DiagnosticStatus.ERROR
-    assert rig.vehicle[-1].faults == []
+def test_diagnostics_say_which_way_a_kill_goes(kind):
+    network = Network(Autopilot(kind=kind)).run(10.0)
+    _, level, message, values, _ = details_of(network.link, network.now).kill
+    known = {name: f"{value:g}" for name, value in kind.parameters.items()}
+    assert values.items() >= known.items()
+    assert "forced disarm" in message
+    assert ("only once a deploy is decided" in message) is (kind in (GENERIC, PX4))
+    assert level != DiagnosticStatus.ERROR
+    assert network.link.vehicle_state(network.now).faults == ()
 
 
 def test_a_setting_that_makes_the_kill_impossible_forbids_take_off(bench):
@@ -181,15 +207,13 @@ def test_a_setting_that_makes_the_kill_impossible_forbids_take_off(bench):
     ],
     ids=["no parachute", "no autopilot", "a fault", "not ready", "released"],
 )
-def test_the_heartbeat_says_why_the_device_is_not_healthy(bench, settings, expect, reason):
-    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-    node = bench.add(MavlinkParachuteNode, **quick(expect_parachute=expect))
-    if settings is not None:
-        bench.simulate(Module(settings), f"udpout:{LOCAL}:{port_of(node.loop)}")
-    bench.until(
-        lambda: beats and any(text.startswith(reason) for text in beats[-1].reasons), reason
-    )
-    assert not beats[-1].device_healthy
+def test_the_heartbeat_says_why_the_device_is_not_healthy(settings, expect, reason):
+    devices = [] if settings is None else [Module(settings)]
+    network = Network(*devices).run(3.0)
+    runtime = MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=expect), Any)
+    summary = runtime.summarise(network.link, network.now)
+    assert any(text.startswith(reason) for text in summary.reasons), summary.reasons
+    assert not summary.device_healthy
 
 
 def test_a_parachute_of_heartbeats_alone_is_said_with_what_to_do(bench):
@@ -207,39 +231,22 @@ def test_a_parachute_of_heartbeats_alone_is_said_with_what_to_do(bench):
 # Flight block
 
 
-class Highest:
-    """Follows how high the vehicle was, and for how long it was armed."""
-
-    def __init__(self, autopilot):
-        self.height = 0.0
-        self._autopilot, self._step = autopilot, autopilot.model.step
-        autopilot.model.step = self._follow
-
-    def _follow(self, dt):
-        self._step(dt)
-        self.height = max(self.height, self._autopilot.model.height)
-
-
-def arm_and_take_off(bench, autopilot):
-    def order():
-        autopilot._set_armed(True)
-        autopilot._takeoff((0.0,) * 6 + (30.0,))
-
-    do(bench, autopilot.loop, order)
-
-
 @KINDS
-def test_what_is_armed_and_taken_off_at_once_does_not_get_away(bench, kind):
-    rig = Rig(bench, Autopilot(kind=kind))
-    rig.report(rig.decide(Action.FLIGHT_BLOCK), Outcome.CONFIRMED)
-    bench.until(lambda: rig.vehicle[-1].height_age < 0.5, "its height is known")
-    rig.autopilot.model.climb_speed = 1.5
-    highest = Highest(rig.autopilot)
-    arm_and_take_off(bench, rig.autopilot)
-    bench.until(lambda: not rig.autopilot.model.armed, "it is disarmed")
-    bench.until(lambda: rig.autopilot.model.height == 0.0, "it is down")
-    assert highest.height < 2.0
-    assert rig.autopilot.heard_command(TERMINATE) == []
+def test_what_is_armed_and_taken_off_at_once_does_not_get_away(kind):
+    autopilot, highest = Autopilot(kind=kind), 0.0
+    network = Network(autopilot).run(5.0)
+    network.link.flight_block("no parachute", network.now)
+    network.run(0.5)
+    autopilot.model.climb_speed = 1.5
+    autopilot._set_armed(True)
+    autopilot._takeoff((0.0,) * 6 + (30.0,))
+    for _ in range(1000):
+        network.run(0.01)
+        highest = max(highest, autopilot.model.height)
+    assert highest < 2.0
+    assert not autopilot.model.armed
+    assert autopilot.model.height == 0.0
+    assert autopilot.heard_command(TERMINATE) == []
 
 
 def order_to_arm(bench, autopilot):
