@@ -45,7 +45,8 @@ def command(bench, number, **fields):
 # ~/command
 
 
-def test_each_command_moves_the_controller_and_is_confirmed_by_its_status(bench, devices):
+def test_each_command_moves_the_controller_is_confirmed_by_its_status_and_logged(bench, devices):
+    said = bench.follow_log()
     story = [
         (Command.TAKEOFF, TAKEOFF),
         (Command.ARM, ARMED),
@@ -57,9 +58,11 @@ def test_each_command_moves_the_controller_and_is_confirmed_by_its_status(bench,
         assert answer.success, answer.message
         assert devices.controller.state is state
     assert devices.controller.came == ["TYPE_TAKEOFF", "TYPE_ARM", "TYPE_DISARM", "TYPE_LAND"]
-
-
-def test_on_the_ground_only_the_forced_deploy_fires(bench, devices):
+    bench.until(
+        lambda: any(one.msg == "~/command TYPE_TAKEOFF called: 'a test'" for one in said),
+        "it is logged with its reason",
+    )
+    # On the ground only the forced deploy fires.
     answer = command(bench, Command.DEPLOY)
     assert not answer.success
     assert "its state is READY: force sends TYPE_DEPLOY_FORCE" in answer.message
@@ -85,15 +88,6 @@ def test_a_command_that_is_none_or_to_what_is_no_controller_is_refused(bench, de
             assert "triggers received: 34" in answer.message
     assert devices.controller.came == []
     assert not devices.trigger.fired
-
-
-def test_a_command_is_in_the_log_with_its_reason(bench, devices):
-    said = bench.follow_log()
-    command(bench, Command.TAKEOFF)
-    bench.until(
-        lambda: any(one.msg == "~/command TYPE_TAKEOFF called: 'a test'" for one in said),
-        "it is logged",
-    )
 
 
 # ~/restart, ~/save_params, ~/erase_params
@@ -124,7 +118,9 @@ def test_a_restart_is_a_restart_and_blocks_flight_meanwhile(bench, network):
     assert devices.controller.booted_at > 0.0
 
 
-def test_what_was_not_saved_is_gone_after_a_restart_and_what_was_is_not(bench, devices):
+def test_what_was_not_saved_is_gone_after_a_restart_what_was_is_not_and_erase_ends_both(
+    bench, devices
+):
     assert call(bench, SetParam, "set_param", name=p.AUTO_SAVE, value="false").success
     answer = call(bench, SetParam, "set_param", name=p.LIGHT, value="false")
     assert answer.success, answer.message
@@ -136,10 +132,6 @@ def test_what_was_not_saved_is_gone_after_a_restart_and_what_was_is_not(bench, d
     assert (answer.success, answer.message) == (True, "save: done")
     assert call(bench, NodeRequest, "restart").success
     assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "false"
-
-
-def test_erased_parameters_are_as_delivered(bench, devices):
-    assert call(bench, SetParam, "set_param", name=p.LIGHT, value="false").success
     answer = call(bench, NodeRequest, "erase_params", reason="a test")
     assert (answer.success, answer.message) == (True, "erase: done")
     assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "true"
