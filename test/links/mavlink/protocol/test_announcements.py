@@ -84,15 +84,15 @@ def test_a_reason_said_before_the_autopilot_was_there_is_said_again_as_it_comes(
 
 def test_a_reason_that_stands_is_said_again_on_the_ground_and_not_in_flight():
     bench = block(Bench(**ASLEEP), "x")
-    bench.stream(3.5 * REASON_AGAIN, 0.5, PILOT, copter, landed)
+    bench.stream(3.5 * REASON_AGAIN, 1.0, PILOT, copter, landed)
     # To nobody, as the autopilot came, and three times.
     assert bench.texts().count("x: flight blocked") == 5
     bench.clear()
     block(bench, "")
-    bench.stream(5.5 * REASON_AGAIN, 0.5, PILOT, copter, landed)
+    bench.stream(5.5 * REASON_AGAIN, 1.0, PILOT, copter, landed)
     assert bench.texts() == ["flight block released"]
     bench = block(flying(), "x")
-    bench.stream(3.5 * REASON_AGAIN, 0.5, PILOT, lambda: copter(armed=True), lambda: landed(2))
+    bench.stream(3.5 * REASON_AGAIN, 1.0, PILOT, lambda: copter(armed=True), lambda: landed(2))
     assert bench.texts().count("x: flight blocked") == 1
 
 

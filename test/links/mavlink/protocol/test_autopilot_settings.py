@@ -76,7 +76,7 @@ def test_they_are_read_again_now_and_then_and_after_a_restart():
     def talk(until, boot):
         while bench.t < until:
             clock = d.MAVLink_system_time_message(0, int((bench.t - boot) * 1000.0))
-            bench.at(bench.t + 0.1).hear(PILOT, ardupilot(), clock)
+            bench.at(bench.t + 0.5).hear(PILOT, ardupilot(), clock)
             if bench.reads():
                 bench.hear(PILOT, setting(asked(bench)[-1], 0))
 

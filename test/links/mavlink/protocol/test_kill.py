@@ -199,8 +199,8 @@ def test_a_pin_that_is_set_or_not_known_is_driven_by_no_kill_alone(method, make,
     """ArduPilot drives it as soon as termination is asked for, also where it then refuses it. An
     answer may be lost: the others show that the autopilot has it."""
     bench = Bench(kill_method=method).hear(PILOT, make())
-    for _ in range(200):
-        bench.at(bench.t + 0.1).hear(PILOT, make())
+    for _ in range(80):
+        bench.at(bench.t + 0.25).hear(PILOT, make())
         bench.hear(PILOT, *(setting(*one) for one in told.items()))
     bench.hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR)).clear()
     kill(bench)
