@@ -10,22 +10,6 @@ from chute_ros.conformance.session import Ended, Session
 from chute_ros.conformance.virtual import VirtualLine
 
 
-def results(line: VirtualLine) -> dict[str, Result]:
-    """By clause."""
-    return {one.clause.name: one for one in line.events if isinstance(one, Result)}
-
-
-def of(line: VirtualLine, verdict: Verdict) -> list[str]:
-    """The clauses with this verdict."""
-    return [name for name, one in results(line).items() if one.verdict is verdict]
-
-
-def problem(line: VirtualLine) -> str:
-    """How it ended."""
-    (ended,) = (one for one in line.events if isinstance(one, Ended))
-    return ended.problem
-
-
 class KitRun:
     """Kit and device on one line."""
 
@@ -49,13 +33,14 @@ class KitRun:
     @property
     def results(self) -> dict[str, Result]:
         """By clause."""
-        return results(self.line)
+        return {one.clause.name: one for one in self.line.events if isinstance(one, Result)}
 
     def of(self, verdict: Verdict) -> list[str]:
         """The clauses with this verdict."""
-        return of(self.line, verdict)
+        return [name for name, one in self.results.items() if one.verdict is verdict]
 
     @property
     def problem(self) -> str:
         """How it ended."""
-        return problem(self.line)
+        (ended,) = (one for one in self.line.events if isinstance(one, Ended))
+        return ended.problem

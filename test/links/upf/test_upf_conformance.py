@@ -4,21 +4,21 @@ time."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit_run import KitRun, of, problem, results
+from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import SOAK, Risk, Verdict
+from chute_ros.conformance.clause import SOAK, Clause, Risk, Verdict
 from chute_ros.conformance.session import Allowed, Session
-from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import (
     A_CONTROLLER,
@@ -66,23 +66,28 @@ class Run(KitRun):
         super().__init__(Session(self.bench, CLAUSES, Allowed(risk, options)), self.bus)
 
 
-def simulated(broken: str) -> VirtualLine:
-    """As the kit has it for its evidence."""
-    line = KIT.virtual(broken)
-    line.run()
-    return line
+def tried(
+    *nodes: UpfNode,
+    options: tuple[str, ...] = (),
+    clauses: Sequence[Clause[UpfBench]] = CLAUSES,
+    **bench: Any,
+) -> KitRun:
+    """The kit on these nodes, to its end; it may do all."""
+    session = Session(
+        UpfBench(DEFINITIONS, Risk.FIRES, **bench), clauses, Allowed(Risk.FIRES, options)
+    )
+    return KitRun(session, UpfBus([*nodes])).to()
 
 
 @pytest.mark.parametrize("given", [(SOAK,), (DNA,), (TRIGGER, SOAK), (TRIGGER, DNA)])
 def test_a_sound_device_passes_all_that_is_allowed(given: tuple[str, ...]) -> None:
     device, bench = KIT.simulated("", " ".join(given))
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, given)), device)
-    line.run()
+    run = KitRun(Session(bench, CLAUSES, Allowed(Risk.FIRES, given)), device).to()
     met = [one for one in CLAUSES if {*one.needs.split()} <= {*given} and not one.out_of_reach]
     passes = [one.name for one in met if one.without not in given]
     # Nothing is wrong with it.
-    assert of(line, Verdict.PASSED) == [one for one in passes if one != "block-when-abnormal"]
-    assert problem(line) == ""
+    assert run.of(Verdict.PASSED) == [one for one in passes if one != "block-when-abnormal"]
+    assert run.problem == ""
 
 
 def test_each_clause_has_a_way_to_be_broken() -> None:
@@ -90,7 +95,8 @@ def test_each_clause_has_a_way_to_be_broken() -> None:
 
 
 def test_what_no_bench_can_show_is_not_tried_and_has_a_reason() -> None:
-    told = results(simulated(""))
+    line = KIT.virtual("")
+    told = KitRun(line.session, line.device).to().results
     rows = [told[one] for one in NAMES if one not in IN_REACH]
     assert {one.verdict for one in rows} == {Verdict.NOT_TRIED}
     assert all(one.why for one in rows)
@@ -98,20 +104,20 @@ def test_what_no_bench_can_show_is_not_tried_and_has_a_reason() -> None:
 
 def test_a_fault_that_comes_while_it_is_tried_has_it_ask_for_a_flight_block() -> None:
     run = Run(Risk.NONE)
-    run.line.run(lambda: run.controller.state is ParachuteState.READY)
+    run.to(lambda: run.controller.state is ParachuteState.READY)
     ready = run.line.now
-    run.line.run(lambda: run.line.now > ready + 1.0)
+    run.to(lambda: run.line.now > ready + 1.0)
     run.controller.act("error=IMU")
-    run.line.run(lambda: run.line.now > ready + 2.0)
+    run.to(lambda: run.line.now > ready + 2.0)
     run.controller.act("clear-errors")
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     assert run.results["block-when-abnormal"].verdict is Verdict.PASSED
 
 
 def test_one_that_is_fired_by_force_is_not_fired_by_the_other_request_as_well() -> None:
     run = Run(Risk.FIRES, DEPLOY_FORCE)
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     for name in ("deploy-force", "kill-first", "launched-after-trigger", "touchdown"):
         assert run.results[name].verdict is Verdict.PASSED
@@ -208,31 +214,22 @@ class SlyController(UpfController):
     ],
 )
 def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
-    bench = UpfBench(DEFINITIONS, Risk.FIRES)
-    bus = UpfBus([SlyController(does), UpfTrigger(DEFINITIONS)])
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
-    line.run()
-    assert of(line, Verdict.FAILED) == [clause]
+    run = tried(SlyController(does), UpfTrigger(DEFINITIONS))
+    assert run.of(Verdict.FAILED) == [clause]
 
 
 def test_a_forced_deploy_without_the_kill_switch_fails() -> None:
-    bus = UpfBus([SlyController("forces without the kill switch"), UpfTrigger(DEFINITIONS)])
+    controller = SlyController("forces without the kill switch")
     clauses = [one for one in CLAUSES if one.name != "disabled"]
-    allowed = Allowed(Risk.FIRES, (DEPLOY_FORCE,))
-    line = VirtualLine(Session(UpfBench(DEFINITIONS, Risk.FIRES), clauses, allowed), bus)
-    line.run()
-    assert of(line, Verdict.FAILED) == ["kill-first"]
+    run = tried(controller, UpfTrigger(DEFINITIONS), options=(DEPLOY_FORCE,), clauses=clauses)
+    assert run.of(Verdict.FAILED) == ["kill-first"]
 
 
 def test_a_launch_before_a_trigger_that_seldom_reports_fails() -> None:
     trigger = UpfTrigger(DEFINITIONS)
     trigger.status_interval = 1.0
     controller = simulated_controller(DEFINITIONS, ControllerSettings(), "launched-after-trigger")
-    bench = UpfBench(DEFINITIONS, Risk.FIRES)
-    bus = UpfBus([controller, trigger])
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES)), bus)
-    line.run()
-    assert of(line, Verdict.FAILED) == ["launched-after-trigger"]
+    assert tried(controller, trigger).of(Verdict.FAILED) == ["launched-after-trigger"]
 
 
 class ForgetfulTrigger(UpfTrigger):
@@ -258,45 +255,41 @@ class ForgetfulTrigger(UpfTrigger):
 def test_a_trigger_that_forgets_that_it_has_fired_fails(then: str) -> None:
     device = ForgetfulTrigger(DEFINITIONS)
     device.then = then
-    bench = UpfBench(DEFINITIONS, Risk.FIRES, device=A_TRIGGER)
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, (TRIGGER,))), UpfBus([device]))
-    line.run()
-    assert of(line, Verdict.FAILED) == ["trigger-is-launched"]
+    run = tried(device, options=(TRIGGER,), device=A_TRIGGER)
+    assert run.of(Verdict.FAILED) == ["trigger-is-launched"]
 
 
 # -- whatever it is told -------------------------------------------------------------------------
 
 
-def whole(line: VirtualLine) -> None:
+def whole(run: KitRun) -> None:
     """Each clause has its verdict: whatever a device says, or does not, is no mistake of ours."""
-    line.run()
-    assert [*results(line)] == NAMES
-    assert of(line, Verdict.FAILED)
+    assert [*run.to().results] == NAMES
+    assert run.of(Verdict.FAILED)
 
 
 @pytest.mark.parametrize("service", [*UpfController(DEFINITIONS).services])
 def test_a_controller_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
     run = Run(Risk.FIRES)
     del run.controller.services[service]
-    whole(run.line)
+    whole(run)
 
 
 def test_a_controller_without_node_status_is_tried_to_the_end() -> None:
     run = Run(Risk.FIRES)
     del run.controller.broadcasts[NODE_STATUS]
-    whole(run.line)
+    whole(run)
 
 
 def test_a_touchdown_of_a_launch_that_nobody_saw_proves_nothing() -> None:
     """Given a controller that is TOUCHDOWN already as the kit comes."""
     run = Run(Risk.FIRES)
-    run.line.run(lambda: run.controller.state is ParachuteState.TOUCHDOWN)
+    run.to(lambda: run.controller.state is ParachuteState.TOUCHDOWN)
     touchdown = [one for one in CLAUSES if one.name == "touchdown"]
     bench = UpfBench(DEFINITIONS, Risk.FIRES)
-    late = VirtualLine(Session(bench, touchdown, Allowed(Risk.FIRES)), run.line.device)  # type: ignore[arg-type]
-    late.now = run.line.now
-    late.run()
-    assert of(late, Verdict.NOT_TRIED) == ["touchdown"]
+    late = KitRun(Session(bench, touchdown, Allowed(Risk.FIRES)), run.bus)
+    late.line.now = run.line.now
+    assert late.to().of(Verdict.NOT_TRIED) == ["touchdown"]
 
 
 VALUES: st.SearchStrategy[p.Value | None] = st.one_of(
@@ -322,8 +315,8 @@ def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Valu
         return {"value": value, "default_value": value, "name": name.encode()}
 
     run.controller.services[bus_requests.GET_SET] = answer
-    run.line.run()
-    assert [*results(run.line)] == NAMES
+    run.to()
+    assert [*run.results] == NAMES
 
 
 @settings(max_examples=4)
@@ -342,8 +335,8 @@ def test_a_controller_with_any_states_is_tried_to_the_end(
         interval, make = run.controller.broadcasts[message]
         told = partial(_changed, make, field, every)
         run.controller.broadcasts[message] = (interval, told)
-    run.line.run()
-    assert [*results(run.line)] == NAMES
+    run.to()
+    assert [*run.results] == NAMES
 
 
 def _changed(
@@ -367,8 +360,8 @@ def _clamps(controller: UpfController, low: int, high: int) -> None:
 def test_a_controller_that_takes_the_nearest_value_is_as_good_as_one_that_refuses() -> None:
     run = Run(Risk.NONE)
     _clamps(run.controller, 2, 1000)
-    run.line.run()
-    result = results(run.line)["parameter-range"]
+    run.to()
+    result = run.results["parameter-range"]
     assert result.verdict is Verdict.PASSED
     assert "set to -5 and 1000000000 is 2 and 1000;" in result.why
     assert run.controller.values == CONTROLLER_PARAMETERS
@@ -387,8 +380,8 @@ def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None
         return right(request)
 
     run.controller.services[bus_requests.GET_SET] = answer
-    run.line.run()
-    assert results(run.line)["parameter-range"].verdict is Verdict.FAILED
+    run.to()
+    assert run.results["parameter-range"].verdict is Verdict.FAILED
     assert run.controller.values == CONTROLLER_PARAMETERS
     assert run.problem == ""
 
@@ -397,9 +390,8 @@ def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start()
     run = Run(Risk.NONE)
     run.controller.services[bus_requests.RESTART_NODE] = lambda _: None
     (restart,) = (one for one in CLAUSES if one.name == "restart")
-    line = VirtualLine(Session(run.bench, [restart], Allowed()), run.bus)
-    line.run()
-    assert of(line, Verdict.FAILED) == ["restart"]
+    late = KitRun(Session(run.bench, [restart], Allowed()), run.bus).to()
+    assert late.of(Verdict.FAILED) == ["restart"]
 
 
 class StartsLate(UpfNode):
@@ -444,19 +436,18 @@ class LateRestart(StartsLate, UpfController):
 
 @pytest.mark.parametrize("intervals", [False, True])
 def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
-    run = Run(Risk.NONE)
     device = LateRestart(DEFINITIONS)
     device.intervals = intervals
-    line = VirtualLine(run.session, UpfBus([device, run.trigger]))
-    line.run()
-    assert of(line, Verdict.FAILED) == []
-    found = results(line)
+    session = Session(UpfBench(DEFINITIONS), CLAUSES, Allowed())
+    run = KitRun(session, UpfBus([device, UpfTrigger(DEFINITIONS)])).to()
+    assert run.of(Verdict.FAILED) == []
+    found = run.results
     assert found["auto-save"].verdict is Verdict.PASSED
     for name in ("node-interval", "parachute-interval"):
         assert found[name].verdict is Verdict.PASSED
         assert found[name].why.endswith("after a restart") is intervals
     assert device.values == device.saved == CONTROLLER_PARAMETERS
-    assert problem(line) == ""
+    assert run.problem == ""
 
 
 @pytest.mark.parametrize("options", [(DNA,), (TRIGGER, DNA)])
@@ -464,17 +455,16 @@ def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
     options: tuple[str, ...],
 ) -> None:
     """Given a device that has no node id a moment after it has answered RestartNode."""
-    run = Run(Risk.FIRES, *options)
-    late = LateTrigger(DEFINITIONS) if TRIGGER in options else LateRestart(DEFINITIONS)
-    kind = A_TRIGGER if TRIGGER in options else A_CONTROLLER
-    bench = UpfBench(DEFINITIONS, Risk.FIRES, dna=True, device=kind)
-    peer = run.controller if TRIGGER in options else run.trigger
-    line = VirtualLine(Session(bench, CLAUSES, Allowed(Risk.FIRES, options)), UpfBus([late, peer]))
-    line.run()
-    assert of(line, Verdict.FAILED) == []
-    passed = {"trigger-dna", "trigger-dna-forgets"} if TRIGGER in options else {"dna"}
-    assert passed <= {*of(line, Verdict.PASSED)}
-    assert problem(line) == ""
+    if TRIGGER in options:
+        nodes = LateTrigger(DEFINITIONS), UpfController(DEFINITIONS)
+        kind, passed = A_TRIGGER, {"trigger-dna", "trigger-dna-forgets"}
+    else:
+        nodes = LateRestart(DEFINITIONS), UpfTrigger(DEFINITIONS)
+        kind, passed = A_CONTROLLER, {"dna"}
+    run = tried(*nodes, options=options, dna=True, device=kind)
+    assert run.of(Verdict.FAILED) == []
+    assert passed <= {*run.of(Verdict.PASSED)}
+    assert run.problem == ""
 
 
 # -- what it must not do -------------------------------------------------------------------------
@@ -483,7 +473,7 @@ def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
 @pytest.mark.parametrize("risk", list(Risk))
 def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk) -> None:
     run = Run(risk)
-    run.line.run()
+    run.to()
     assert run.controller.values == run.controller.saved == CONTROLLER_PARAMETERS
     assert run.trigger.fired == (risk is Risk.FIRES)
     if risk is Risk.NONE:
@@ -492,7 +482,7 @@ def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk)
         assert run.controller.state is ParachuteState.READY
         deploys = [one for one in run.controller.requests_heard if "DEPLOY" in one]
         assert deploys == []
-    tried = [one for one in CLAUSES if results(run.line)[one.name].verdict is Verdict.PASSED]
+    tried = [one for one in CLAUSES if run.results[one.name].verdict is Verdict.PASSED]
     assert max(one.risk for one in tried) == risk
 
 
@@ -500,31 +490,31 @@ def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk)
 def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed(risk: Risk) -> None:
     """Given one that vanishes with a harmless parameter changed."""
     run = Run(risk)
-    run.line.run(lambda: bool(run.bench.changed))
+    run.to(lambda: bool(run.bench.changed))
     run.controller.act("silent")
-    run.line.run()
-    assert f"{p.NODE_STATUS_INTERVAL} is not" in problem(run.line)
-    assert "ARMED" not in problem(run.line)
+    run.to()
+    assert f"{p.NODE_STATUS_INTERVAL} is not" in run.problem
+    assert "ARMED" not in run.problem
     asked = [one for one in run.bench.traffic if one.sent and names.PARACHUTE_SERVICE in one.name]
     assert asked == []
 
 
 def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
     run = Run(Risk.ARMS)
-    run.line.run(lambda: run.controller.state is ParachuteState.ARMED)
+    run.to(lambda: run.controller.state is ParachuteState.ARMED)
     run.controller.act("silent")
-    run.line.run()
-    assert "it may be LEFT ARMED: no ParachuteStatus shows it" in problem(run.line)
+    run.to()
+    assert "it may be LEFT ARMED: no ParachuteStatus shows it" in run.problem
 
 
 def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
     run = Run(Risk.ARMS)
-    run.line.run(lambda: run.controller.state is ParachuteState.ARMED)
+    run.to(lambda: run.controller.state is ParachuteState.ARMED)
     run.session.abort("aborted by Ctrl-C", run.line.now)
-    run.line.run()
+    run.to()
     assert run.controller.state is ParachuteState.READY
     assert run.controller.values == CONTROLLER_PARAMETERS
-    assert problem(run.line) == "aborted by Ctrl-C"
+    assert run.problem == "aborted by Ctrl-C"
 
 
 @pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.1])
@@ -533,16 +523,15 @@ def test_an_abort_gives_it_its_own_node_id_again(name: str, after: float) -> Non
     """Given a Ctrl-C so long after its static node id became 0."""
     (clause,) = (one for one in CLAUSES if one.name == name)
     device, bench = KIT.simulated("", clause.needs)
-    line = VirtualLine(Session(bench, [clause], Allowed(options=clause.needs.split())), device)
+    run = KitRun(Session(bench, [clause], Allowed(options=clause.needs.split())), device)
     assert isinstance(device, UpfBus)
-    tried, static = device.nodes[0], device.nodes[0].values[p.STATIC_NODE_ID]
-    line.run(lambda: tried.values[p.STATIC_NODE_ID] == 0)
-    until = line.now + after
-    line.run(lambda: line.now >= until)
-    line.session.abort("aborted by Ctrl-C", line.now)
-    line.run()
-    assert problem(line) == "aborted by Ctrl-C"
-    assert tried.node_id == tried.values[p.STATIC_NODE_ID] == static
+    node, static = device.nodes[0], device.nodes[0].values[p.STATIC_NODE_ID]
+    run.to(lambda: node.values[p.STATIC_NODE_ID] == 0)
+    until = run.line.now + after
+    run.to(lambda: run.line.now >= until)
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    assert run.to().problem == "aborted by Ctrl-C"
+    assert node.node_id == node.values[p.STATIC_NODE_ID] == static
     assert static == (TRIGGER_NODE_ID if TRIGGER in clause.needs else CONTROLLER_NODE_ID)
 
 
@@ -550,12 +539,11 @@ def test_a_device_that_comes_back_without_a_node_id_is_named() -> None:
     """Given one that dies while it has none."""
     device, bench = KIT.simulated("", DNA)
     clauses = [one for one in CLAUSES if one.name == "dna"]
-    line = VirtualLine(Session(bench, clauses, Allowed(options=(DNA,))), device)
+    run = KitRun(Session(bench, clauses, Allowed(options=(DNA,))), device)
     assert isinstance(device, UpfBus)
-    line.run(lambda: device.nodes[0].values[p.STATIC_NODE_ID] == 0)
+    run.to(lambda: device.nodes[0].values[p.STATIC_NODE_ID] == 0)
     device.nodes[0].act("silent")
-    line.run()
-    assert f"{p.STATIC_NODE_ID} is LEFT 0" in problem(line)
+    assert f"{p.STATIC_NODE_ID} is LEFT 0" in run.to().problem
 
 
 @pytest.mark.parametrize("risk", list(Risk))
@@ -599,7 +587,7 @@ FIRING = [one for one in CLAUSES if TRIGGER in one.needs and one.risk is Risk.FI
 def test_of_a_whole_parachute_the_trigger_alone_is_tried(risk: Risk) -> None:
     """Given a controller on its bus."""
     run = Run(risk, TRIGGER)
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     assert run.bench.node == TRIGGER_NODE_ID
     assert run.trigger.fired == (risk is Risk.FIRES)
@@ -614,7 +602,7 @@ def test_a_controller_is_not_taken_for_a_trigger() -> None:
     """Given a bus without a trigger."""
     run = Run(Risk.FIRES, TRIGGER)
     run.bus.nodes.remove(run.trigger)
-    run.line.run()
+    run.to()
     assert run.problem.startswith("no TriggerStatus is received")
     assert f"received from nodes: {CONTROLLER_NODE_ID}" in run.problem
     assert run.controller.requests_heard == []
@@ -626,7 +614,7 @@ def test_where_several_would_fire_nothing_is_fired(options: tuple[str, ...]) -> 
     values = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: 35}
     other = UpfTrigger(DEFINITIONS, NodeSettings("another trigger", values))
     run.bus.nodes.append(other)
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     assert not run.trigger.fired
     assert not other.fired
@@ -637,7 +625,7 @@ def test_where_several_would_fire_nothing_is_fired(options: tuple[str, ...]) -> 
 
 def test_one_that_is_fired_by_the_broadcast_is_not_fired_by_the_service_as_well() -> None:
     run = Run(Risk.FIRES, TRIGGER, BROADCAST)
-    run.line.run()
+    run.to()
     assert run.results["trigger-broadcast"].verdict is Verdict.PASSED
     assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
     assert run.results["trigger-is-launched"].verdict is Verdict.PASSED
@@ -651,7 +639,7 @@ def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action: str, wh
     run = Run(Risk.FIRES, TRIGGER)
     run.trigger.add_action("trigger-fired", lambda _: run.trigger.fire("somebody"))
     run.trigger.act(action)
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     met = [one.name for one in FIRING if BROADCAST not in one.needs][:-1]
     assert [one for one in met if not run.results[one].why.startswith(why)] == []
@@ -659,9 +647,9 @@ def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action: str, wh
 
 def test_one_that_fires_by_itself_between_two_clauses_fails_once() -> None:
     run = Run(Risk.FIRES, TRIGGER)
-    run.line.run(lambda: "trigger-unknown-type" in run.results)
+    run.to(lambda: "trigger-unknown-type" in run.results)
     run.trigger.fire("itself")
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == ["trigger-self-test"]
     assert run.results["trigger-self-test"].why == "IT HAS FIRED, and nothing told it to"
     assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
@@ -670,10 +658,10 @@ def test_one_that_fires_by_itself_between_two_clauses_fails_once() -> None:
 def test_one_that_fires_late_by_the_broadcast_did_not_fire_by_itself() -> None:
     run = Run(Risk.FIRES, TRIGGER, BROADCAST)
     run.trigger.act("trigger-stuck")
-    run.line.run(lambda: "trigger-broadcast" in run.results)
+    run.to(lambda: "trigger-broadcast" in run.results)
     run.trigger.act("trigger-free")
     run.trigger.fire("the broadcast")
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == ["trigger-broadcast"]
     assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
 
@@ -689,14 +677,14 @@ def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_h
         return right(request)
 
     run.trigger.services[names.TRIGGER_SERVICE] = serve
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == ["trigger-bad-magic"]
 
 
 def test_a_refusal_to_launch_fails() -> None:
     run = Run(Risk.FIRES, TRIGGER)
     run.trigger.act("refuse")
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == ["trigger-launch"]
     assert run.results["trigger-launch"].why == "TYPE_LAUNCH: FAILED"
 
@@ -705,7 +693,7 @@ def test_what_the_data_types_do_not_have_is_not_tried() -> None:
     """Given types of another vendor, with a launch that names no node, and no self test."""
     definitions = Definitions(load_data_types(str(OTHER_TYPES), "--dsdl-path"))
     run = Run(Risk.FIRES, TRIGGER, definitions=definitions)
-    run.line.run()
+    run.to()
     assert run.of(Verdict.FAILED) == []
     assert run.trigger.fired
     lack = [name for name, one in run.results.items() if one.why.startswith("the data types have")]
@@ -716,7 +704,7 @@ def test_what_the_data_types_do_not_have_is_not_tried() -> None:
 def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
     run = Run(Risk.FIRES, TRIGGER)
     del run.trigger.services[service]
-    whole(run.line)
+    whole(run)
 
 
 @settings(max_examples=4)
@@ -732,8 +720,8 @@ def test_a_trigger_with_any_states_is_tried_to_the_end(
     told = partial(_changed, right, "state", cycle(states))
     both = partial(_changed, told, "is_launched", cycle(launched))
     run.trigger.broadcasts[names.TRIGGER_STATUS] = (interval, both)
-    run.line.run()
-    assert [*results(run.line)] == NAMES
+    run.to()
+    assert [*run.results] == NAMES
 
 
 @pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
