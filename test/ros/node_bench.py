@@ -91,6 +91,13 @@ class Bench:
         self.loops.remove(loop)
         loop.stop()
 
+    def have(self, loop: WireLoop[Any], function: Callable[[Any], Any]) -> Any:
+        """Have function(device) called in the thread of a simulated device; what it gives."""
+        done: list[Any] = []
+        loop.call(lambda device, now: done.append(function(device)))
+        self.until(lambda: done, "the simulator has done so")
+        return done[0]
+
     def close(self) -> None:
         """Take everything down."""
         for loop in self.loops:

@@ -21,7 +21,7 @@ class MavlinkDevice(SimulatedDevice):
         self.loop = self.bench.simulate(self.module, f"udpout:{LOCAL}:{self.port}")
 
     def _act(self, action):
-        self.loop.call(lambda link, now: self.module.act(action))
+        self.bench.have(self.loop, lambda module: module.act(action))
 
     def fall_silent(self):
         self._act("silent")
@@ -31,7 +31,6 @@ class MavlinkDevice(SimulatedDevice):
 
     def stop_answering(self):
         self._act("mute")
-        self._flush()
 
     def be_stuck(self):
         self.module.stuck = True
@@ -49,11 +48,6 @@ class MavlinkDevice(SimulatedDevice):
     @property
     def deployed(self):
         return bool(self.module.deployment)
-
-    def _flush(self):
-        done = []
-        self.loop.call(lambda link, now: done.append(now))
-        self.bench.until(lambda: done, "the simulator has done so")
 
 
 class TestMavlinkParachute(DeviceSuite):

@@ -88,10 +88,7 @@ class Cable:
     def call(self, function):
         """Have function(flight computer) called in its own thread, and wait for what it gives."""
         assert self.loop is not None
-        done: list[Any] = []
-        self.loop.call(lambda link, now: done.append(function(link)))
-        self.bench.until(lambda: done, "the simulator has done so")
-        return done[0]
+        return self.bench.have(self.loop, function)
 
     def act(self, action):
         """An action of --at."""

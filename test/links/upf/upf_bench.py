@@ -172,14 +172,7 @@ class Devices:
 
     def act(self, action):
         """Have them do so."""
-        done: list[float] = []
-
-        def act(link, now):
-            link.act(action)
-            done.append(now)
-
-        self.loop.call(act)
-        self.bench.until(lambda: done, f"the simulator has done {action}")
+        self.bench.have(self.loop, lambda bus: bus.act(action))
 
     def fly(self):
         """The vehicle says that it is in the air, until the node has heard it."""
