@@ -1,15 +1,15 @@
-"""upf_can passes the stories of all device nodes, over real CAN frames, with either data types."""
+"""upf_can passes the stories of all device nodes, over real CAN frames."""
 
 from device_suite import DeviceSuite
 from simulated_device import SimulatedDevice
-from upf_bench import OTHER_LAYOUT, Network
+from upf_bench import Network
 
 
 class UpfDevice(SimulatedDevice):
     """The controller and the trigger of sim_upf."""
 
-    def __init__(self, network, fault):
-        self.network, self.bench, self.fault = network, network.bench, fault
+    def __init__(self, network):
+        self.network, self.bench = network, network.bench
         self.controller, self.trigger = network.controller(), network.trigger()
         self.loop = None
 
@@ -17,14 +17,7 @@ class UpfDevice(SimulatedDevice):
         self.loop = self.network.plug(self.controller, self.trigger)
 
     def _act(self, action):
-        done = []
-
-        def act(link, now):
-            link.act(action)
-            done.append(now)
-
-        self.loop.call(act)
-        self.bench.until(lambda: done, "the simulator has done so")
+        self.bench.have(self.loop, lambda bus: bus.act(action))
 
     def fall_silent(self):
         self._act("silent")
@@ -40,7 +33,7 @@ class UpfDevice(SimulatedDevice):
 
     def break_down(self):
         self._act("error=IMU")
-        return self.fault
+        return "IMU"
 
     def come_to_ground(self):
         self.controller.cleared = False
@@ -57,16 +50,6 @@ class TestUpfCan(DeviceSuite):
     """The link of this suite is DroneCAN."""
 
     name = "upf_can"
-    folder = ""
-    fault = "IMU"
 
     def make(self, bench, **parameters):
-        network = Network(bench, dsdl_path=self.folder, **parameters)
-        return UpfDevice(network, self.fault)
-
-
-class TestUpfCanWithOtherDataTypes(TestUpfCan):
-    """The same with data types that are laid out differently."""
-
-    folder = str(OTHER_LAYOUT)
-    fault = "error_imu"
+        return UpfDevice(Network(bench, **parameters))
