@@ -38,7 +38,7 @@ def test_a_port_that_comes_back_is_open_again(bench):
     cable.await_link(LinkState.OK)
 
 
-@pytest.mark.parametrize("pulls", [100, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("pulls", [30, pytest.param(1000, marks=pytest.mark.long)])
 def test_many_pulled_cables_leave_nothing_behind(bench, monkeypatch, pulls):
     monkeypatch.setattr(wire_loop, "REOPEN_INTERVAL", 0.005)
     cable = Cable(bench, FlightComputerSettings(rate=100.0), settle_time=0.0, **PATIENT)
@@ -69,15 +69,12 @@ def test_many_pulled_cables_leave_nothing_behind(bench, monkeypatch, pulls):
     assert bench.until(counted, "it still tells how it is") == ["0"]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_any_garbage_is_counted_and_dropped_and_the_next_record_is_told(bench, seed):
+def test_any_garbage_is_counted_and_dropped_and_the_next_record_is_told(bench):
     """Given a cable with noise on it, when telemetry is received after all, then it is told."""
-    chance = random.Random(seed)
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     cable = Cable(bench, FlightComputerSettings(rate=RATE), **PATIENT)
     wire = PtyWire(str(cable.path))
-    noise = Noise(chance)
-    loop = WireLoop(noise, wire, lambda events: None)
+    loop = WireLoop(Noise(random.Random(1)), wire, lambda events: None)
     loop.start()
     bench.loops.append(loop)
     bench.until(lambda: cable.node.loop.link.received_bytes > 100_000, "much of it has come")
@@ -167,17 +164,6 @@ def test_a_device_that_floods_keeps_neither_heartbeat_nor_commands_from_their_tu
     assert "flight mode Startup" in answer.message, "and it answers"
     counts = cable.node.loop.link.counts
     assert counts["lines for the log beyond fifty a second"] > 1000, "nobody could read them"
-
-
-def test_lines_that_are_cut_and_garbage_in_between_cost_only_themselves(bench):
-    settings = FlightComputerSettings(rate=100.0, cut=0.2, garbage=0.2, seed=5)
-    cable = Cable(bench, settings, **PATIENT)
-    cable.plugged()
-    bench.until(lambda: len(cable.telemetry) > 100, "what is whole is told")
-    modes = {t.flight_mode for t in cable.telemetry}
-    assert modes == {Telem.STARTUP}, "never half a record"
-    uptimes = [t.device_uptime for t in cable.telemetry]
-    assert uptimes == sorted(uptimes)
 
 
 def test_each_way_that_a_port_cannot_be_opened_is_one_clear_line_and_it_keeps_trying(bench):
