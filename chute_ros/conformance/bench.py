@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -25,6 +25,11 @@ class ReceivedPacket:
 
 
 ReceivedT = TypeVar("ReceivedT", bound=ReceivedPacket)
+
+
+def in_words(fields: Mapping[str, Any]) -> str:
+    """The fields of a message, as a Packet has them."""
+    return ", ".join(f"{name}={value}" for name, value in fields.items())
 
 
 def first_of(

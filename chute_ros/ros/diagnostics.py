@@ -22,6 +22,8 @@ OK, WARN, ERROR, STALE = (
     DiagnosticStatus.ERROR,
     DiagnosticStatus.STALE,
 )
+#: Task, level, text, values and device: status() makes a message of it.
+Task = tuple[str, bytes, str, Mapping[str, object], str]
 #: For so long (s) drops are counted; so many are few; such a share of all is usual on a bad line.
 _RECENTLY, _FEW_DROPS, _USUAL_SHARE = 10.0, 20, 0.2
 

@@ -14,8 +14,6 @@ from chute_ros.model import NAN, LinkState, flag_names
 from chute_ros.protocol.mavlink.frames import UNKNOWN_MESSAGE
 from chute_ros.ros import diagnostics
 
-#: Task, level, text, values and device: diagnostics.status makes a message of it.
-Task = tuple[str, bytes, str, Mapping[str, object], str]
 _NEVER: tuple[bytes, str, dict[str, object], str] = (diagnostics.STALE, "never received", {}, "")
 
 #: Reasons for which something is dropped that could be read.
@@ -38,9 +36,9 @@ class MavlinkDetails:
     #: What came, and was of no use.
     useless: Mapping[str, object]
     dropped: Counter[str]
-    parachutes: tuple[Task, ...]
-    autopilot: Task
-    kill: Task
+    parachutes: tuple[diagnostics.Task, ...]
+    autopilot: diagnostics.Task
+    kill: diagnostics.Task
 
 
 def details_of(link: MavlinkLink, now: float) -> MavlinkDetails:
@@ -84,7 +82,7 @@ def tasks(name: str, details: MavlinkDetails, expects_parachute: bool) -> list[D
     return [diagnostics.status(name, *task) for task in told]
 
 
-def _parachute(one: ParachuteTracker, now: float) -> Task:
+def _parachute(one: ParachuteTracker, now: float) -> diagnostics.Task:
     status = one.status(now)
     values = {
         **diagnostics.liveness_values(one.liveness, now),
@@ -103,7 +101,7 @@ def _parachute(one: ParachuteTracker, now: float) -> Task:
     return f"parachute {status.device}", level, text, values, status.device
 
 
-def _autopilot(link: MavlinkLink, now: float) -> Task:
+def _autopilot(link: MavlinkLink, now: float) -> diagnostics.Task:
     vehicle, autopilot = link.vehicle_state(now), link.chosen_autopilot()
     rates, round_trip = {}, NAN
     if autopilot is not None:
@@ -157,7 +155,7 @@ def not_seen(rates: Mapping[str, float]) -> list[str]:
     return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
 
 
-def _kill(link: MavlinkLink) -> Task:
+def _kill(link: MavlinkLink) -> diagnostics.Task:
     """Which way a kill goes, whether the autopilot's settings allow it, and the flight block."""
     setup = link.setup()
     if setup is None:

@@ -16,9 +16,6 @@ from chute_ros.links.umbilical.protocol.line_parser import UNKNOWN_LINE
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.ros import diagnostics
 
-#: Task, level, text, values and device: diagnostics.status makes a message of it.
-Task = tuple[str, bytes, str, Mapping[str, object], str]
-
 #: Reasons for which something is dropped that could be read, or that a beginning brings along.
 READABLE = (
     UNKNOWN_LINE,
@@ -41,8 +38,8 @@ class UmbilicalDetails:
     layout: str
     commands: Mapping[str, object]
     dropped: Counter[str]
-    computer: Task
-    heartbeat: Task
+    computer: diagnostics.Task
+    heartbeat: diagnostics.Task
     work: str
 
 
@@ -93,7 +90,7 @@ def memory_task(
     return diagnostics.status(name, "memory", level, text, values, "")
 
 
-def _computer(link: UmbilicalLink, now: float) -> Task:
+def _computer(link: UmbilicalLink, now: float) -> diagnostics.Task:
     """The flight computer by its telemetry."""
     computer, record = link.computer, link.computer.record
     if record is None:
@@ -118,7 +115,7 @@ def _computer(link: UmbilicalLink, now: float) -> Task:
     return "parachute", level, text, values, status.device
 
 
-def _heartbeat(link: UmbilicalLink, now: float) -> Task:
+def _heartbeat(link: UmbilicalLink, now: float) -> diagnostics.Task:
     """Our heartbeat to the flight computer, without which it takes the umbilical for lost."""
     scheduler = link.scheduler
     age = now - scheduler.last_heartbeat

@@ -15,8 +15,6 @@ from chute_ros.links.upf.protocol.devices import Controller, Device, Trigger
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.ros import diagnostics
 
-#: Task, level, text, values and device: diagnostics.status makes a message of it.
-Task = tuple[str, bytes, str, Mapping[str, object], str]
 _NO_CONTROLLER = (
     "never received, and without it this link has no parachute (controller_node_id: its node id, "
     "or 0; without_controller: true where the vehicle has none)"
@@ -42,7 +40,7 @@ class UpfDetails:
     dropped: Counter[str]
     bus: Mapping[str, object]
     #: Of the devices and of the vehicle service.
-    tasks: tuple[Task, ...]
+    tasks: tuple[diagnostics.Task, ...]
     given: Mapping[str, str]
     refusal: str
     allocation_left_to: int
@@ -93,7 +91,7 @@ def allocation_task(name: str, details: UpfDetails, path: str) -> DiagnosticStat
     return diagnostics.status(name, "node ids", level, text, {**details.given, "file": path}, "")
 
 
-def _devices(link: UpfLink, now: float) -> Iterator[Task]:
+def _devices(link: UpfLink, now: float) -> Iterator[diagnostics.Task]:
     """One task for each controller and trigger, and one for a controller that is missing."""
     controllers, triggers = link.devices.controllers, link.devices.triggers
     if not controllers and not triggers:
@@ -129,7 +127,7 @@ def _of_controller(one: Controller, now: float) -> dict[str, object]:
 
 def _device(
     one: Device, state: str, faults: list[str], special: Mapping[str, Any], now: float
-) -> Task:
+) -> diagnostics.Task:
     healthy = one.liveness.state is model.LinkState.OK and not faults
     values = {
         **diagnostics.liveness_values(one.liveness, now),
@@ -144,7 +142,7 @@ def _device(
     return f"{one.kind} {one.node_id}", level, text, values, one.device
 
 
-def _vehicle_service(link: UpfLink) -> Task:
+def _vehicle_service(link: UpfLink) -> diagnostics.Task:
     """Requests of devices to the vehicle, and their answers."""
     answer = link.vehicle_service.newest_answer
     failed = answer.endswith(("FAILED", "BAD_MAGIC_NUMBER"))

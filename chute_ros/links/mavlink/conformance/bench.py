@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of
+from chute_ros.conformance.bench import ReceivedPacket, RecordingBench, first_of, in_words
 from chute_ros.conformance.clause import DecidedError, Packet, Risk, Trial, Wait, failed
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
@@ -181,8 +181,7 @@ class MavlinkBench(RecordingBench[ReceivedFrame]):
     def _noted(self, message: Any, sender: str, sent: bool, raw: bytes) -> Packet:
         fields = message.to_dict()
         name = fields.pop("mavpackettype")
-        text = ", ".join(f"{key}={value}" for key, value in fields.items())
-        return self.noted(sent, sender, name, text, bytes(raw))
+        return self.noted(sent, sender, name, in_words(fields), bytes(raw))
 
     # -- steps of trials ------------------------------------------------------------------------
 

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 from typing import Any
 
-from chute_ros.conformance.bench import NotAllowedError, ReceivedPacket, RecordingBench, first_of
+from chute_ros.conformance.bench import (
+    NotAllowedError,
+    ReceivedPacket,
+    RecordingBench,
+    first_of,
+    in_words,
+)
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
@@ -162,13 +168,12 @@ class UpfBench(RecordingBench[TransferPacket]):
         return one
 
     def _packet(self, heard: ReceivedTransfer, data: bytes, now: float) -> TransferPacket:
-        text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
         label = (
             heard.name
             if heard.kind is TransferKind.MESSAGE
             else f"{heard.name} {heard.kind.value}"
         )
-        packet = self.noted(False, f"node {heard.source}", label, text, data)
+        packet = self.noted(False, f"node {heard.source}", label, in_words(heard.values), data)
         return TransferPacket(now, heard.name, packet, heard)
 
     def stream_ended(self, stream: Hashable) -> None:
@@ -217,8 +222,8 @@ class UpfBench(RecordingBench[TransferPacket]):
         self._check(service, values)
         for _ in range(tries):
             number = self._next_number(server, service)
-            text = ", ".join(f"{key}={value}" for key, value in values.items())
-            self.noted(True, "us", f"{service} request to node {server}", text, b"")
+            name = f"{service} request to node {server}"
+            self.noted(True, "us", name, in_words(values), b"")
             self._endpoint.request(server, service, number, values, 16)
             answer = yield from self._response(server, service, number)
             if answer is not None:
@@ -267,8 +272,8 @@ class UpfBench(RecordingBench[TransferPacket]):
             (self._endpoint, self._second), ("us", "a second node"), asked, strict=True
         ):
             values = {"index": 0, "value": {"empty": {}}, "name": name.encode()}
-            text = ", ".join(f"{key}={value}" for key, value in values.items())
-            self.noted(True, who, f"{service} request to node {self.node}", text, b"")
+            asks = f"{service} request to node {self.node}"
+            self.noted(True, who, asks, in_words(values), b"")
             endpoint.request(self.node, service, number, values, 16)
             frames.append(endpoint.take_output())
         alternating = chain.from_iterable(zip_longest(*frames))
@@ -420,8 +425,7 @@ class UpfBench(RecordingBench[TransferPacket]):
         magic = {"magic_number": self.definitions.constant(name, names.MAGIC)}
         values = self.definitions.present(name, {**magic, **told})
         self._check(name, values)
-        text = ", ".join(f"{key}={value}" for key, value in values.items())
-        self.noted(True, "us", name, text, b"")
+        self.noted(True, "us", name, in_words(values), b"")
         self._endpoint.broadcast(name, values)
 
     def get(self, name: str = "", index: int = 0) -> Any:
