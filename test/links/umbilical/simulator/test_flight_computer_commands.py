@@ -1,8 +1,5 @@
 """How the simulated flight computer hears: one token a packet, a pause, a queue of four."""
 
-import re
-from pathlib import Path
-
 import pytest
 from test_flight_computer import Host
 
@@ -34,14 +31,6 @@ def test_the_commands_are_those_of_the_reference_and_each_has_its_handler():
         assert one.take() == [token]
         assert one.take() == []
         assert not one.lost, token
-
-
-def test_each_command_is_named_in_a_story_of_its_own():
-    """Beside this file's table: a test that says what the command does."""
-    files = Path(__file__).parent.glob("test_flight_computer*.py")
-    stories = "".join(f.read_text() for f in files if f.name != Path(__file__).name)
-    for token in (*NAMES, "<T,", "<H>"):
-        assert re.fullmatch("<A?[1-4]>", token) or token in stories, token
 
 
 # Packets
@@ -94,9 +83,6 @@ def test_two_that_wait_together_are_lost():
     one = hearing((0.0, b"<H>"), (0.001, b"<L>"), (0.2, b"<H>"))
     assert one.came == [(0.001, "<L>")]
     assert one.heartbeats == [0.0, 0.2]
-
-
-# The pause
 
 
 # The queue

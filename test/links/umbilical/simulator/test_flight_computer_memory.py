@@ -164,12 +164,6 @@ def test_a_second_job_waits_for_nobody():
 # Snapshots
 
 
-def test_before_the_first_snapshot_the_ring_is_empty():
-    host = Host()
-    host.send("<f>")
-    assert host.others == ["Snapshot: ring empty"]
-
-
 def test_the_newest_snapshot_is_shown():
     host = standing_by()
     host.send("<M>")
@@ -188,17 +182,6 @@ def test_snapshots_outlive_a_reboot_but_not_their_reset():
     host.send("<f>")
     assert host.others[0].startswith("SNAP seq=")
     host.send("<F>")
-    host.forget()
-    host.send("<f>")
-    assert host.others == ["Snapshot: ring empty"]
-
-
-def test_fram_is_wiped_with_a_reboot_in_one_command():
-    host = standing_by()
-    host.run(2.0)
-    host.send("<X>", 1.0)
-    assert host.newest["flight_mode"] == 0
-    assert host.newest["ms_since_boot_cfc"] < 1100
     host.forget()
     host.send("<f>")
     assert host.others == ["Snapshot: ring empty"]

@@ -10,7 +10,6 @@ from upf_device_bench import (
     BY_REQUEST,
     CONTROLLER,
     KILL,
-    LAYOUTS,
     NODE_STATUS,
     RELEASE,
     TRIGGER,
@@ -26,18 +25,6 @@ from chute_ros.model import ParachuteState as S
 from chute_ros.sim.motion import Motion
 
 # Self test
-
-
-@BOTH_LAYOUTS
-def test_it_blocks_the_flight_until_its_self_test_has_passed(layout):
-    story = Story(layout, self_test=0.5).run(0.3)
-    assert story.state is S.NOT_READY
-    assert story.asked() == [BLOCK]
-    story.run(0.4)
-    assert story.state is S.READY
-    assert story.asked() == [BLOCK, RELEASE]
-    story.run(5.0)
-    assert story.asked() == [BLOCK, RELEASE], "each is said once"
 
 
 @BOTH_LAYOUTS
@@ -105,33 +92,7 @@ def test_of_two_vehicles_it_talks_to_the_first():
 # Take-off, arm, disarm, land: by request
 
 
-@BOTH_LAYOUTS
-def test_a_whole_flight_by_request(layout):
-    story = ready(layout)
-    for request, state in (
-        ("TAKEOFF", S.TAKEOFF),
-        ("ARM", S.ARMED),
-        ("DISARM", S.TAKEOFF),
-        ("LAND", S.READY),
-    ):
-        assert story.ask(request) == "SUCCESS"
-        assert story.state is state, "it says so at once"
-    story.run(1.0)
-    assert story.asked() == [BLOCK, RELEASE, RELEASE], "READY again releases again"
-
-
 REQUESTS = ("TAKEOFF", "ARM", "DISARM", "LAND")
-
-
-def test_a_request_is_rejected_while_its_own_automatic_function_is_on():
-    for name in REQUESTS:
-        for layout in LAYOUTS:
-            story = Story(layout).run(1.0)
-            assert story.ask(name) == "REJECTED", name
-            assert story.state is S.READY
-        # Given the others on and its own off: whatever comes of it, it is not rejected.
-        story = Story(values={p.EXCLUDES[f"TYPE_{name}"]: False}).run(1.0)
-        assert story.ask(name) in ("SUCCESS", "FAILED"), name
 
 
 def test_what_the_state_does_not_allow_fails_and_changes_nothing():
@@ -154,17 +115,6 @@ def test_asking_once_more_for_what_is_so_succeeds():
     for name in ("TAKEOFF", "ARM"):
         assert [story.ask(name), story.ask(name)] == ["SUCCESS", "SUCCESS"]
     assert story.states() == [S.NOT_READY, S.READY, S.TAKEOFF, S.ARMED]
-
-
-def test_a_bad_magic_number_or_a_type_without_a_name_does_nothing():
-    for layout, bad in (("ours", "BAD_MAGIC_NUMBER"), ("other", "REJECTED")):
-        story = ready(layout)
-        values = story.definitions.request(names.PARACHUTE_SERVICE, "TYPE_TAKEOFF")
-        bad_magic = values | {"magic_number": values["magic_number"] + 1}
-        assert story.result(names.PARACHUTE_SERVICE, bad_magic) == bad
-        assert story.controller.requests_heard == []
-        assert story.result(names.PARACHUTE_SERVICE, values | {"type": 99}) == "REJECTED"
-        assert story.run(0.2).state is S.READY
 
 
 # Take-off, arm, disarm, land: automatic

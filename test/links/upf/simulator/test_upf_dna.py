@@ -1,15 +1,8 @@
-"""Dynamic node ids: a device asks, an allocator gives, ours or the one of the library."""
+"""Dynamic node ids: a device asks, our allocator gives; the library's: test_upf_third_party."""
 
-import contextlib
-from collections import deque
 from itertools import pairwise
 
-import dronecan
 import pytest
-from dronecan.app.dynamic_node_id import CentralizedServer
-from dronecan.driver.common import AbstractDriver
-from dronecan.driver.common import CANFrame as LibraryFrame
-from dronecan.transport import TransferError
 from upf_device_bench import Story, definitions
 
 from chute_ros.links.upf.protocol import parameters as p
@@ -18,7 +11,6 @@ from chute_ros.links.upf.simulator.node import NodeSettings
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState as S
 from chute_ros.protocol.dronecan.allocation import MESSAGE, Allocator
-from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
 
 DYNAMIC = {p.STATIC_NODE_ID: 0}
 UNIT = bytes(range(16))
@@ -50,75 +42,6 @@ class Office:
                 self.story.vehicle.endpoint.broadcast(MESSAGE, answer)
             self.story.exchange()
         return self
-
-
-class Memory(AbstractDriver):
-    """A driver of the library without a bus: frames are put in and taken out."""
-
-    def __init__(self):
-        super().__init__()
-        self.incoming, self.outgoing = deque(), []
-
-    def close(self):
-        pass
-
-    def receive(self, timeout=None):
-        return self.incoming.popleft() if self.incoming else None
-
-    def send_frame(self, frame):
-        self.outgoing.append(frame)
-
-
-class AllDiscovered:
-    """A node monitor of the library on a bus where all is known."""
-
-    def add_update_handler(self, handler):
-        return self
-
-    def remove(self):
-        pass
-
-    def find_all(self, predicate):
-        return []
-
-    def are_all_nodes_discovered(self):
-        return True
-
-
-class LibraryAllocator:
-    """dronecan's own CentralizedServer, fed with frames of ours."""
-
-    def __init__(self):
-        self._memory = Memory()
-        self._node = dronecan.node.Node(self._memory, node_id=100)
-        self._server = CentralizedServer(self._node, AllDiscovered())
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._server.close()
-        self._node.close()
-
-    def receive(self, data):
-        """Bytes of a frame. The library stamps it with the machine's time, by which it sees a
-        whole story as one moment: nothing of it is too old."""
-        frame = unpack(data)
-        self._memory.incoming.append(LibraryFrame(frame.identifier, frame.data, frame.extended))
-
-    def take_output(self):
-        """Let it work; the frames that it sends."""
-        while self._memory.incoming:
-            # It raises for what it does not know, and goes on with the next frame.
-            with contextlib.suppress(TransferError):
-                self._node.spin(0)
-        sent, self._memory.outgoing = self._memory.outgoing, []
-        return [pack(CanFrame(one.id, bytes(one.data), one.extended)) for one in sent]
-
-    def table(self):
-        """Unique id -> node id."""
-        entries = self._server.get_allocation_table()
-        return {bytes(unique): node for unique, node in entries if unique is not None}
 
 
 def test_a_device_without_an_id_asks_in_three_parts_and_works_with_what_it_gets():
@@ -180,35 +103,6 @@ def test_a_bus_full_of_them_ends_with_an_id_each(count):
     ids = [node.node_id for node in story.bus.nodes]
     assert 0 not in ids
     assert len(set(ids)) == len(ids)
-
-
-def test_a_unit_that_is_known_gets_its_id_again_but_does_not_keep_it():
-    story = Story(values=DYNAMIC)
-    office = Office(story, {story.controller.settings.unique_id: 60}).run(4.0)
-    assert story.controller.node_id == 60
-    story.restart(60)
-    assert story.controller.node_id == 0
-    office.run(4.0)
-    assert story.controller.node_id == 60
-    assert p.value_of(story.get(p.STATIC_NODE_ID, 60)["value"]) == 0
-
-
-def test_the_allocator_of_the_library_serves_two_at_once():
-    """Given dronecan's own CentralizedServer behind a driver in memory."""
-    story = Story(values=DYNAMIC, trigger_values=DYNAMIC)
-    with LibraryAllocator() as office:
-        for _ in range(3000):
-            story.bus.update(story.now)
-            for frame in story.bus.take_output():
-                office.receive(frame)
-            for frame in office.take_output():
-                story.bus.receive(frame, story.now)
-            story.now += 0.01
-        table = office.table()
-    for node in (story.controller, story.trigger):
-        assert node.node_id
-        assert table[node.settings.unique_id] == node.node_id
-    assert story.controller.node_id != story.trigger.node_id
 
 
 # The client alone, rule by rule

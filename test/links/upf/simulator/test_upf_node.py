@@ -15,7 +15,6 @@ from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.transfer import Transfer, TransferKind, frames_of
 
-SWITCHES = [one.name for one in p.PARAMETERS if one.kind is bool]
 NUMBERS = [one.name for one in p.PARAMETERS if one.kind is int]
 STATUS = names.PARACHUTE_STATUS
 
@@ -26,51 +25,6 @@ def value(story, name, server=CONTROLLER):
 
 
 # GetSet
-
-
-def test_it_has_the_twelve_parameters_of_the_document():
-    story = ready()
-    listed = []
-    for index in range(20):
-        answer = story.call(bus_requests.GET_SET, {"index": index})
-        if not answer["name"]:
-            break
-        listed.append(answer["name"].decode())
-    assert sorted(listed) == sorted(one.name for one in p.PARAMETERS)
-    assert len(listed) == 12
-    beyond = story.call(bus_requests.GET_SET, {"index": 12})
-    assert p.kind_of(beyond["value"]) == ""
-
-
-def test_each_is_read_by_name_with_its_kind_range_and_default():
-    story = ready()
-    for name, documented in p.BY_NAME.items():
-        answer = story.get(name)
-        assert answer["name"].decode() == name
-        kind = "boolean" if documented.kind is bool else "integer"
-        assert p.kind_of(answer["value"]) == p.kind_of(answer["default_value"]) == kind, name
-        limits = (p.value_of(answer["min_value"]), p.value_of(answer["max_value"]))
-        if documented.kind is int:
-            assert limits == (documented.minimum, documented.maximum), name
-        else:
-            assert limits[0] is None, name
-
-
-def test_a_switch_is_switched_and_read_back():
-    for name in SWITCHES:
-        story = ready()
-        before = value(story, name)
-        assert story.set(name, not before) is not before
-        assert value(story, name) is not before, name
-
-
-def test_a_number_is_taken_up_to_its_limits_and_not_beyond():
-    for name in NUMBERS:
-        story, documented = ready(), p.BY_NAME[name]
-        for limit in (documented.minimum, documented.maximum):
-            assert story.set(name, limit) == limit
-        for beyond in (documented.minimum - 1, documented.maximum + 1, 2**40):
-            assert story.set(name, beyond) == documented.maximum, name
 
 
 def test_what_is_of_the_wrong_kind_is_not_taken():
@@ -85,16 +39,6 @@ def test_what_is_of_the_wrong_kind_is_not_taken():
         assert story.controller.switch(p.ENABLE_APS)
     for number, taken in ((0, False), (1, True), (0.0, False)):
         assert ready().set(p.ENABLE_APS, number) is taken, "a switch as a number"
-
-
-def test_an_unknown_name_is_answered_with_nothing():
-    for name in ("No Such Parameter", "enable aps", "\N{PARACHUTE}"):
-        story = ready()
-        answer = story.get(name)
-        assert answer["name"] == b"", name
-        assert p.kind_of(answer["value"]) == ""
-        assert story.set(name, True) is None
-    assert ready().call(bus_requests.GET_SET, {"name": b"\xff\xfe"})["name"] == b""
 
 
 def test_a_name_counts_more_than_an_index():
@@ -129,17 +73,6 @@ def test_static_node_id_counts_from_the_next_start():
     assert p.value_of(story.get(p.STATIC_NODE_ID, 77)["value"]) == 77
 
 
-def test_static_node_id_0_asks_for_one_from_the_next_start():
-    story = ready()
-    story.set(p.STATIC_NODE_ID, 0)
-    assert story.run(0.5).heard(STATUS)
-    story.restart()
-    story.forget()
-    story.run(3.0)
-    assert not story.heard(STATUS)
-    assert story.heard("uavcan.protocol.dynamic_node_id.Allocation", 0)
-
-
 def test_an_interval_counts_at_once():
     for name, message, interval in (
         (p.NODE_STATUS_INTERVAL, NODE_STATUS, 0.2),
@@ -157,35 +90,7 @@ def test_an_interval_counts_at_once():
     assert len(story.run(1.0).heard(STATUS)) >= 9
 
 
-def test_resistor_and_light_change_nothing_on_the_bus():
-    for name in (p.CANBUS_RESISTER, p.LIGHT):
-        story = ready()
-        before = dict(story.status)
-        story.set(name, not story.controller.switch(name))
-        assert story.run(1.0).status == before, name
-
-
 # Memory
-
-
-def test_a_change_survives_a_restart_with_auto_save_or_once_it_is_saved():
-    for auto_save, opcode, later, kept in (
-        (True, None, None, True),
-        (False, None, None, False),
-        (False, bus_requests.OPCODE_SAVE, None, True),
-        (False, None, True, True),
-    ):
-        story = ready()
-        story.set(p.AUTO_SAVE, auto_save)
-        story.set(p.ENABLE_APS, False)
-        assert value(story, p.ENABLE_APS) is False
-        assert opcode is None or story.opcode(opcode)
-        if later is not None:
-            story.set(p.AUTO_SAVE, later)
-        story.restart()
-        assert value(story, p.ENABLE_APS) is not kept, (auto_save, opcode, later)
-        assert value(story, p.AUTO_SAVE) is (auto_save or later or False), "which itself is kept"
-    assert ready().opcode(7) is False
 
 
 def test_erase_brings_back_what_was_delivered():
@@ -205,31 +110,6 @@ def test_erase_brings_back_what_was_delivered():
 # Who it is, and how it is
 
 
-def test_it_says_who_it_is():
-    story, units = ready(), set()
-    for server, name in ((CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")):
-        answer = story.call(bus_requests.GET_NODE_INFO, {}, server)
-        assert answer["name"] == name
-        unit = bytes(answer["hardware_version"]["unique_id"])
-        assert len(unit) == 16
-        assert any(unit)
-        units.add(unit)
-        assert answer["status"]["uptime_sec"] == int(story.now - story.began)
-    assert len(units) == 2
-
-
-def test_node_status_comes_at_its_interval_with_uptime_and_health():
-    story = Story()
-    story.controller.health = 0
-    story.run(5.5)
-    told = [message.values for message in story.heard(NODE_STATUS)]
-    assert [one["uptime_sec"] for one in told] == list(range(len(told)))
-    assert len(told) in (5, 6)
-    story.controller.health = 2
-    story.run(1.1)
-    assert story.heard(NODE_STATUS)[-1].values["health"] == 2
-
-
 def test_transport_stats_count_transfers_and_errors():
     story = ready()
     first = story.call(bus_requests.TRANSPORT_STATS, {})
@@ -242,20 +122,6 @@ def test_transport_stats_count_transfers_and_errors():
 
 
 # Restarts
-
-
-def test_a_restart_is_answered_and_then_done_unless_its_magic_number_is_another():
-    for server, name in ((CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")):
-        story = ready()
-        story.restart(server)
-        story.run(0.5)
-        answer = story.call(bus_requests.GET_NODE_INFO, {}, server)
-        assert (answer["status"]["uptime_sec"], answer["name"]) == (0, name)
-    for magic in (0, bus_requests.RESTART_MAGIC - 1, 2**40 - 1):
-        story = ready()
-        assert story.call(bus_requests.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
-        story.run(0.5)
-        assert story.call(bus_requests.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1, magic
 
 
 def test_services_that_it_does_not_have_are_not_answered():
