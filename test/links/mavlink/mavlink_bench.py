@@ -1,11 +1,14 @@
 """What the tests of mavlink_parachute share: quick parameters, and devices that remember."""
 
 import time
+from typing import Any
 
 from chute_msgs.msg import SafetyState
 from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import SafetyFlags
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
@@ -132,16 +135,31 @@ class Network:
         return self.bench.simulate(device, self.wire, **options)
 
 
+class VirtualNetwork:
+    """The link and devices, each of which hears all others, in virtual time."""
+
+    def __init__(self, *devices, **config):
+        self.link, self.devices = MavlinkLink(MavlinkConfig(**config)), devices
+        self.now = max([one.now for one in devices], default=0.0)
+        self.events: list[Any] = []
+
+    def run(self, seconds):
+        for _ in range(round(seconds / 0.01)):
+            self.now += 0.01
+            everybody = (self.link, *self.devices)
+            for one in everybody:
+                one.update(self.now)
+                for frame in one.take_output():
+                    for other in everybody:
+                        if other is not one:
+                            other.receive(frame, self.now)
+            self.events += self.link.take_events()
+        return self
+
+
 def do(bench, loop, function):
     """Have function() called in the thread of a simulated device, and wait for it."""
-    done: list[float] = []
-
-    def call(link, now):
-        function()
-        done.append(now)
-
-    loop.call(call)
-    bench.until(lambda: done, "the simulator has done so")
+    bench.have(loop, lambda device: function())
 
 
 class ChainFlight:

@@ -8,16 +8,15 @@ import pytest
 from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, VehicleState
 from chute_msgs.srv import Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from mavlink_bench import Autopilot, Module, airborne, do, quick
+from mavlink_bench import Autopilot, Module, VirtualNetwork, airborne, do, quick
 from node_bench import LOCAL, port_of, stamped
 
-from chute_ros.links.mavlink.diagnostics import details_of
+from chute_ros.links.mavlink.diagnostics import details_of, tasks
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.links.mavlink.protocol.config import KillMethod, MavlinkConfig
-from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
-from chute_ros.model import Action, Outcome
+from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameEncoder
@@ -32,28 +31,6 @@ KINDS = pytest.mark.parametrize(
 
 def with_settings(kind, **values):
     return replace(kind, parameters={**kind.parameters, **values})
-
-
-class Network:
-    """The link and devices, each of which hears all others, in virtual time."""
-
-    def __init__(self, *devices, **config):
-        self.link, self.devices = MavlinkLink(MavlinkConfig(**config)), devices
-        self.now = max([one.now for one in devices], default=0.0)
-        self.events: list[Any] = []
-
-    def run(self, seconds):
-        for _ in range(round(seconds / 0.01)):
-            self.now += 0.01
-            everybody = (self.link, *self.devices)
-            for one in everybody:
-                one.update(self.now)
-                for frame in one.take_output():
-                    for other in everybody:
-                        if other is not one:
-                            other.receive(frame, self.now)
-            self.events += self.link.take_events()
-        return self
 
 
 class Rig:
@@ -110,7 +87,7 @@ class Rig:
 def test_a_kill_at_1_3_m_stops_the_motors_and_releases_nothing(kind, method):
     autopilot = airborne(1.3, kind)
     module = Module(ParachuteSettings(armed_triggers=12, ground_cleared="yes"))
-    network = Network(autopilot, module, kill_method=method).run(5.0)
+    network = VirtualNetwork(autopilot, module, kill_method=method).run(5.0)
     network.link.kill(1, network.now)
     network.run(2.0)
     (end,) = [one.finished for one in network.events if isinstance(one, RequestFinished)]
@@ -169,7 +146,7 @@ def test_a_deploy_over_motors_that_turn_says_so_in_its_answer(bench):
 
 @KINDS
 def test_diagnostics_say_which_way_a_kill_goes(kind):
-    network = Network(Autopilot(kind=kind)).run(10.0)
+    network = VirtualNetwork(Autopilot(kind=kind)).run(10.0)
     _, level, message, values, _ = details_of(network.link, network.now).kill
     known = {name: f"{value:g}" for name, value in kind.parameters.items()}
     assert values.items() >= known.items()
@@ -209,7 +186,7 @@ def test_a_setting_that_makes_the_kill_impossible_forbids_take_off(bench):
 )
 def test_the_heartbeat_says_why_the_device_is_not_healthy(settings, expect, reason):
     devices = [] if settings is None else [Module(settings)]
-    network = Network(*devices).run(3.0)
+    network = VirtualNetwork(*devices).run(3.0)
     runtime = MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=expect), Any)
     summary = runtime.summarise(network.link, network.now)
     assert any(text.startswith(reason) for text in summary.reasons), summary.reasons
@@ -228,13 +205,37 @@ def test_a_parachute_of_heartbeats_alone_is_said_with_what_to_do(bench):
     assert "check its firmware" in beats[-1].reasons[0]
 
 
+def test_where_no_parachute_is_expected_the_heartbeat_stands_for_the_autopilot():
+    """Given a second autopilot after a while; then ours falls silent."""
+    runtime = MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=False), Any)
+    network = VirtualNetwork(autopilot := Autopilot())
+
+    def told():
+        summary = runtime.summarise(network.link, network.now)
+        return summary.link_state, summary.device_healthy
+
+    assert told() == (LinkState.NEVER_SEEN, False)
+    network.run(2.0)
+    assert told() == (LinkState.OK, True)
+    details = details_of(network.link, network.now)
+    for expected in (True, False):
+        names = [one.name for one in tasks("node", details, expected)]
+        assert ("node: parachute" in names) is expected, "the one that is missing"
+    network.devices += (Autopilot(system_id=2),)
+    network.run(2.0)
+    assert told() == (LinkState.OK, False), "a second one makes it doubtful"
+    autopilot.act("silent")
+    network.run(6.0)
+    assert told() == (LinkState.LOST, False)
+
+
 # Flight block
 
 
 @KINDS
 def test_what_is_armed_and_taken_off_at_once_does_not_get_away(kind):
     autopilot, highest = Autopilot(kind=kind), 0.0
-    network = Network(autopilot).run(5.0)
+    network = VirtualNetwork(autopilot).run(5.0)
     network.link.flight_block("no parachute", network.now)
     network.run(0.5)
     autopilot.model.climb_speed = 1.5

@@ -1,16 +1,13 @@
 """Supervisor, mavlink_parachute, upf_can and all simulators: from one wire to the other."""
 
-import pytest
-from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState, VehicleState
+from chute_msgs.msg import ParachuteStatus, SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy
-from diagnostic_msgs.msg import DiagnosticArray
-from mavlink_bench import Autopilot, ChainFlight, do
+from mavlink_bench import Autopilot, ChainFlight
 from mavlink_bench import quick as quick_mavlink
 from node_bench import LOCAL, port_of
 from upf_bench import Network
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.model import LinkState
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 LINKS = ["mavlink_parachute", "upf_can"]
@@ -49,7 +46,7 @@ class Flight(ChainFlight):
         self.loop = self.network.plug(self.controller, self.trigger)
 
     def device(self, action):
-        do(self.bench, self.loop, lambda: self.loop.link.act(action))
+        self.bench.have(self.loop, lambda bus: bus.act(action))
 
     def await_said(self, text):
         self.bench.until(
@@ -134,35 +131,3 @@ def test_a_controller_that_restarts_on_the_ground_blocks_flight_until_it_is_read
     flight.device("reboot")
     flight.await_stage(SafetyState.BLOCKED)
     flight.await_stage(SafetyState.READY)
-
-
-@pytest.mark.parametrize("expected", [True, False])
-def test_where_no_mavlink_parachute_is_expected_the_heartbeat_stands_for_the_autopilot(
-    bench, expected
-):
-    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    node = bench.add(MavlinkParachuteNode, **quick_mavlink(expect_parachute=expected))
-    bench.until(lambda: beats, "it beats")
-    assert (beats[-1].link_state, beats[-1].device_healthy) == (LinkState.NEVER_SEEN, False)
-    autopilot = Autopilot()
-    loop = bench.simulate(autopilot, f"udpout:{LOCAL}:{port_of(node.loop)}")
-
-    def told():
-        return [one.name.rpartition(": ")[2] for array in diagnostics for one in array.status]
-
-    bench.until(lambda: "autopilot" in told(), "the autopilot is told of")
-    if expected:
-        assert "parachute" in told(), "the one that is missing"
-        assert beats[-1].link_state == LinkState.NEVER_SEEN
-        return
-    assert not any(name.startswith("parachute") for name in told())
-    bench.until(lambda: beats[-1].link_state == LinkState.OK, "the autopilot is heard")
-    assert beats[-1].device_healthy
-    second = Autopilot(system_id=2)
-    bench.simulate(second, f"udpout:{LOCAL}:{port_of(node.loop)}")
-    bench.until(lambda: not beats[-1].device_healthy, "a second one makes it doubtful")
-    assert beats[-1].link_state == LinkState.OK
-    do(bench, loop, lambda: autopilot.act("silent"))
-    bench.until(lambda: beats[-1].link_state == LinkState.LOST, "its silence is told")
-    assert not beats[-1].device_healthy
