@@ -1,21 +1,17 @@
 """upf_can on a bus that loses, doubles, spoils and floods."""
 
 import random
-import time
 
 import pytest
-from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyDecision
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus
 from chute_msgs.srv import Arm, Deploy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from node_bench import stamped
-from upf_bench import Devices, Network, fly, tasks, values
+from upf_bench import Devices, Network
 
 from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
 from chute_ros.model import LinkState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS
-from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
-from chute_ros.ros import qos
+from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
 from chute_ros.sim.can_faults import CanFaultKnobs
 
 #: A bus that loses much needs limits to match.
@@ -120,101 +116,3 @@ def test_a_flood_keeps_neither_heartbeat_nor_status_nor_deploy(bench, garbage):
     assert devices.trigger.fired
     assert network.node._loop_faults == 0
     assert network.link.bus.endpoint.received_count > 0
-
-
-# Who is on the bus
-
-
-def link_task(diagnostics):
-    return tasks(diagnostics).get("link")
-
-
-def await_trouble(bench, diagnostics, text):
-    bench.until(
-        lambda: link_task(diagnostics) and text in link_task(diagnostics).message,
-        f"diagnostics say {text!r}",
-    )
-    assert link_task(diagnostics).level == DiagnosticStatus.ERROR
-
-
-def await_well(bench, diagnostics):
-    bench.until(
-        lambda: link_task(diagnostics).level == DiagnosticStatus.OK, "diagnostics are well again"
-    )
-
-
-def test_two_devices_with_one_node_id_forbid_take_off_only(bench):
-    network = Network(bench, vehicle_state_age=60.0)
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    devices = Devices(network)
-    bench.until(lambda: network.link.bus.nodes.get(33).uptime >= 4, "it runs for a while")
-    twin = network.plug(network.controller())
-    await_trouble(bench, diagnostics, "two nodes use node id 33: give one of them another")
-    devices.await_beat(device_healthy=False)
-    fly(bench, network)
-    devices.await_beat(device_healthy=True)
-    # Both are switched off, and one of them on again.
-    bench.unplug(twin)
-    bench.unplug(devices.loop)
-    bench.until(lambda: not network.link.bus.nodes.conflicts(time.monotonic()), "nobody speaks")
-    network.plug(devices.controller, devices.trigger)
-    await_well(bench, diagnostics)
-
-
-def test_one_that_arms_or_flies_under_a_flight_block_lifts_it_not_by_that(bench):
-    """Given a doubt as flight is blocked, and an order to disarm that is lost; by its height the
-    supervisor knows when it flies, and releases the block."""
-    network = Network(bench, vehicle_state_age=60.0)
-    devices = Devices(network)
-    bench.until(lambda: network.link.bus.nodes.get(33).uptime >= 4, "it runs for a while")
-    network.plug(network.controller())
-    devices.await_beat(device_healthy=False)
-
-    def decide(number, action):
-        decision = SafetyDecision(epoch=1, id=number, action=action, rule="links")
-        decision.targets = ["upf_can"]
-        bench.publish(stamped(bench.client, decision), "safety/decision", qos.DECISION)
-
-    decide(1, SafetyDecision.FLIGHT_BLOCK)
-    bench.until(lambda: network.node.runtime._held, "it is blocked")
-    fly(bench, network)
-    devices.beats.clear()
-    bench.until(lambda: len(devices.beats) >= 5, "five heartbeats")
-    assert not any(one.device_healthy for one in devices.beats)
-    decide(2, SafetyDecision.FLIGHT_BLOCK_RELEASE)
-    devices.await_beat(device_healthy=True)
-
-
-def test_another_node_with_our_node_id_is_told_and_forbids_take_off(bench):
-    network = Network(bench)
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    devices = Devices(network)
-    party = network.party(NODE_ID)
-    party.say(NODE_STATUS, uptime_sec=1)
-    devices.await_beat(device_healthy=False)
-    text = "another node uses our node id 100: set node_id to a free one"
-    await_trouble(bench, diagnostics, text)
-    await_well(bench, diagnostics)
-    devices.await_beat(device_healthy=True)
-
-
-# The bus itself
-
-
-def test_bus_off_is_told_and_over_once_the_controller_restarts(bench):
-    network = Network(bench)
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    devices = Devices(network)
-    devices.act("silent")
-    # What was still on its way would say that the bus is not off.
-    devices.await_beat(link_state=LinkState.LOST)
-    # As the wire of an interface that tells of errors hands them on.
-    off = pack(CanFrame(ERROR_BUS_OFF, b"", False, error=True))
-    network.node.loop.call(lambda link, now: link.receive(off, now))
-    await_trouble(bench, diagnostics, "the CAN controller is bus-off")
-    assert values(link_task(diagnostics))["times bus-off"] == "1"
-    back = pack(CanFrame(ERROR_RESTARTED, b"", False, error=True))
-    network.node.loop.call(lambda link, now: link.receive(back, now))
-    await_well(bench, diagnostics)
-    devices.act("speak")
-    devices.await_beat(device_healthy=True)

@@ -93,29 +93,6 @@ def test_after_a_restart_of_the_node_each_device_has_the_same_id_again(bench, tm
     assert path.read_text() == kept
 
 
-def test_a_new_device_is_not_given_the_id_of_one_that_is_away(bench, tmp_path):
-    path = tmp_path / "ids.json"
-    network = network_of(bench, path)
-    first = network.trigger("one", **DYNAMIC)
-    loop = network.plug(first)
-    (node_id,) = await_ids(bench, first)
-    bench.unplug(loop)
-    network.restart()
-    second = network.trigger("two", **DYNAMIC)
-    network.plug(second)
-    assert await_ids(bench, second) != [node_id]
-
-
-def test_an_id_in_use_by_a_static_node_is_not_given_out(bench, tmp_path):
-    path = tmp_path / "ids.json"
-    network = network_of(bench, path)
-    static = network.trigger("static", **{p.STATIC_NODE_ID: 125})
-    dynamic = network.trigger("dynamic", **DYNAMIC)
-    network.plug(static, dynamic)
-    (node_id,) = await_ids(bench, dynamic)
-    assert node_id not in (125, 0)
-
-
 def test_without_a_place_for_the_table_nothing_is_given_out_until_there_is_one(bench, tmp_path):
     said = bench.follow_log()
     folder, target = tmp_path / "folder", tmp_path / "target"
@@ -158,32 +135,6 @@ def test_where_the_allocator_is_off_nobody_is_given_an_id(bench, tmp_path):
     assert not path.exists()
 
 
-@pytest.mark.parametrize("allocator", [True, "true"])
-def test_the_allocator_may_be_switched_on_as_yaml_reads_it_or_as_text(bench, tmp_path, allocator):
-    network = network_of(bench, tmp_path / "ids.json", allocator)
+def test_the_allocator_may_be_switched_on_as_yaml_reads_it(bench, tmp_path):
+    network = network_of(bench, tmp_path / "ids.json", allocator=True)
     assert network.node.values["allocator"] == "true"
-
-
-def test_an_autopilot_that_gives_out_node_ids_is_left_to_it(bench, tmp_path):
-    """Given a node 10 that answers each request, as ArduPilot does."""
-    path = tmp_path / "ids.json"
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    network = network_of(bench, path)
-    autopilot = network.party(10)
-    trigger = network.trigger(**DYNAMIC)
-    network.plug(trigger)
-    answered = []
-
-    def left():
-        asked = [one for one in autopilot.heard if (one.name, one.source) == (MESSAGE, 0)]
-        for one in asked[len(answered) :]:
-            answered.append(one)
-            autopilot.say(MESSAGE, unique_id=bytes(one.values["unique_id"]), node_id=0)
-        task = tasks(diagnostics).get("node ids")
-        return task and task.message == "node 10 gives out node ids"
-
-    bench.until(left, "it is told")
-    link = tasks(diagnostics)["link"]
-    assert "gives out node ids" not in link.message, "it is no trouble of the bus"
-    assert tasks(diagnostics)["node ids"].level == DiagnosticStatus.OK
-    assert not path.exists()
