@@ -15,7 +15,6 @@ from sensor_msgs.msg import BatteryState
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import LinkState, ParachuteState
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.ros import qos
 
 
@@ -272,21 +271,6 @@ def test_garbage_is_counted_in_diagnostics_and_harms_nothing(bench, network):
     bench.until(counted, "each byte is counted")
 
 
-def test_a_line_of_which_much_cannot_be_read_warns(bench, network):
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    network.plug(Module())
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
-
-        def warned():
-            noise.sendto(b"\xff" * 50, (LOCAL, port_of(network.node.loop)))
-            link = tasks(diagnostics).get("mavlink_parachute: link")
-            return link and link.level == DiagnosticStatus.WARN and "much could" in link.message
-
-        bench.until(warned, "the link warns")
-    told = tasks(diagnostics)["mavlink_parachute: link"].message
-    assert "s much could not be read, mostly: bytes that are no MAVLink frame (" in told
-
-
 class GroundStation(Autopilot):
     """Reads the texts for the pilot, chunk by chunk."""
 
@@ -317,23 +301,6 @@ def test_the_pilot_reads_the_whole_reason_of_a_block_first(bench, network):
     bench.publish(stamped(bench.client, block), "safety/decision", qos.DECISION)
     whole = f"{reason}: flight blocked"
     bench.until(lambda: whole in station.texts, "the whole text is received")
-
-
-def test_an_acknowledgement_that_nobody_waits_for_is_counted_in_diagnostics(bench, network):
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    # Of a parachute that was asked for nothing, to the node (system 1, component 191).
-    ack = dialect.MAVLink_command_ack_message(
-        dialect.MAV_CMD_DO_PARACHUTE, 0, target_system=1, target_component=191
-    )
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as parachute:
-        frame = FrameEncoder(1, 161).encode(ack, 0.0)
-        parachute.sendto(frame, (LOCAL, port_of(network.node.loop)))
-
-        def counted():
-            link = tasks(diagnostics).get("mavlink_parachute: link")
-            return link and values(link)["unexpected acknowledgements"] == "1"
-
-        bench.until(counted, "it is counted")
 
 
 def test_a_busy_port_is_an_error_in_diagnostics_until_it_is_free(bench):

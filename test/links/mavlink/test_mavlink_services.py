@@ -95,14 +95,6 @@ def test_deploy_with_force_arms_on_the_way(bench, module):
     assert module.deployment
 
 
-def test_a_lost_acknowledgement_is_no_lost_deploy(bench, module):
-    assert call(bench, Arm, "arm", arm=True).success
-    do(bench, module.loop, lambda: setattr(module, "acknowledge", lambda *_: None))
-    answer = call(bench, Deploy, "deploy", reason="a test")
-    assert (answer.success, answer.accepted) == (True, False)
-    assert "not acknowledged" in answer.message
-
-
 def test_two_services_at_once_each_get_their_own_answer(bench, module):
     triggers = bench.ask(SetTriggers, "mavlink_parachute/set_triggers", arm=1, select=1)
     information = bench.ask(GetInfo, "mavlink_parachute/get_info")
@@ -122,12 +114,6 @@ def test_a_requested_message_comes_as_json(bench, module):
     told = json.loads(answer.json)
     assert told["mavpackettype"] == "PARACHUTE_STATUS"
     assert told["parachute_packed_date"] == "2026-06-19"
-
-
-def test_a_message_that_the_device_does_not_have_is_denied_in_words(bench, module):
-    answer = call(bench, RequestMessage, "request_message", message_id=30)
-    assert (answer.success, answer.result, answer.json) == (False, DENIED, "")
-    assert "denied" in answer.message
 
 
 def test_an_interval_is_set_and_read_back(bench, module):

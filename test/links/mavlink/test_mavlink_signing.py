@@ -34,9 +34,8 @@ def key_file(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("text", [KEY, KEY.hex().encode(), KEY.hex().upper().encode() + b"\n"])
-def test_signed_both_ways_they_understand_each_other(bench, key_file, text):
-    key_file.write_bytes(text)
+def test_signed_both_ways_they_understand_each_other(bench, key_file):
+    key_file.write_bytes(KEY.hex().upper().encode() + b"\n")
     beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     module = SigningModule(KEY)
     Network(bench, signing_key_file=str(key_file)).plug(module)
