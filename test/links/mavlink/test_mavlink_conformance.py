@@ -1,9 +1,6 @@
 """The kit on the simulated parachute, sound and broken in each clause, in virtual time."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from itertools import cycle
 
 import pytest
@@ -23,14 +20,13 @@ from chute_ros.model import DeploymentTrigger, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
-from chute_ros.sim.mavlink_device import Params
 
 NAMES = [one.name for one in CLAUSES]
 IN_REACH = [one.name for one in CLAUSES if not one.out_of_reach]
 OF_SIGNING = ["unsigned-refused", "wrong-key-refused", "replay-refused", "signed-answers"]
 
 
-def key() -> tuple[Signer, Verifier]:
+def key():
     """The key of the simulated bench."""
     clock = SigningClock(1_790_000_000.0)
     return Signer(bytes(range(32)), clock), Verifier(bytes(range(32)), clock)
@@ -39,29 +35,24 @@ def key() -> tuple[Signer, Verifier]:
 class Run(KitRun):
     """Kit and device on one line."""
 
-    def __init__(
-        self,
-        device: ParachuteDevice,
-        risk: Risk = Risk.FIRES,
-        session: Session[MavlinkBench] | None = None,
-    ) -> None:
+    def __init__(self, device, risk=Risk.FIRES, session=None):
         super().__init__(session or Session(MavlinkBench(risk), CLAUSES, Allowed(risk)), device)
 
 
-def sound(**settings: object) -> ParachuteDevice:
-    return ParachuteDevice(ParachuteSettings(**settings), [])  # type: ignore[arg-type]
+def sound(**settings):
+    return ParachuteDevice(ParachuteSettings(**settings), [])
 
 
-def simulated(broken: str) -> Run:
+def simulated(broken):
     """As the kit has it for its evidence."""
     line = KIT.virtual(broken)
-    return Run(line.device, session=line.session).to()  # type: ignore[arg-type]
+    return Run(line.device, session=line.session).to()
 
 
 # -- what it finds ------------------------------------------------------------------------------
 
 
-def test_a_sound_device_passes_all_that_can_be_tried() -> None:
+def test_a_sound_device_passes_all_that_can_be_tried():
     run = simulated("")
     assert run.of(Verdict.FAILED) == run.of(Verdict.NOT_SUPPORTED) == []
     unseen = {*NAMES} - {*IN_REACH}
@@ -72,11 +63,11 @@ def test_a_sound_device_passes_all_that_can_be_tried() -> None:
     assert run.device.armed == TriggerFlags(0)
 
 
-def test_what_needs_a_key_or_the_ground_passes_with_it() -> None:
+def test_what_needs_a_key_or_the_ground_passes_with_it():
     device = sound()
     device.sign(*key())
     session = KIT.virtual("signed-answers").session
-    signed = Run(device, session=session).to()  # type: ignore[arg-type]
+    signed = Run(device, session=session).to()
     assert signed.of(Verdict.FAILED) == []
     assert {*OF_SIGNING} <= {*signed.of(Verdict.PASSED)}
     low = Run(sound(ground_cleared="no")).to()
@@ -85,11 +76,11 @@ def test_what_needs_a_key_or_the_ground_passes_with_it() -> None:
     assert low.results["release"].verdict is Verdict.NOT_TRIED
 
 
-def test_each_clause_has_a_way_to_be_broken() -> None:
+def test_each_clause_has_a_way_to_be_broken():
     assert {*BREAKS} == {*IN_REACH}
 
 
-def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
+def test_a_device_that_leaves_out_what_it_may_is_not_blamed():
     """Given one without intervals, information and MAV_CMD_DO_PARACHUTE."""
     device = sound()
     for command in (dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_DO_PARACHUTE):
@@ -111,28 +102,28 @@ class SlowParachute(ParachuteDevice):
 
     takes = 0.3
 
-    def __init__(self, settings: ParachuteSettings) -> None:
+    def __init__(self, settings):
         super().__init__(settings, [])
         self._waiting: list[tuple[float, Frame]] = []
 
-    def _command(self, frame: Frame) -> None:
+    def _command(self, frame):
         self.acknowledge(frame, int(dialect.MAV_RESULT_IN_PROGRESS))
         self._waiting.append((self.now + self.takes, frame))
         self.step(self.now)
 
-    def step(self, now: float) -> None:
+    def step(self, now):
         super().step(now)
         due = [frame for at, frame in self._waiting if at <= now]
         self._waiting = [(at, frame) for at, frame in self._waiting if at > now]
         for frame in due:
             super()._command(frame)
 
-    def next_step(self) -> float:
+    def next_step(self):
         return min((at for at, _ in self._waiting), default=math.inf)
 
 
 @pytest.mark.parametrize("takes", [0.0, 0.3, 2.5])
-def test_a_device_that_is_in_progress_first_is_judged_by_its_result(takes: float) -> None:
+def test_a_device_that_is_in_progress_first_is_judged_by_its_result(takes):
     device = SlowParachute(ParachuteSettings())
     device.takes = takes
     run = Run(device).to()
@@ -140,7 +131,7 @@ def test_a_device_that_is_in_progress_first_is_judged_by_its_result(takes: float
     assert {"release", "released-stays", "arm-sources"} <= {*run.of(Verdict.PASSED)}
 
 
-def test_a_device_that_stays_in_progress_has_no_result() -> None:
+def test_a_device_that_stays_in_progress_has_no_result():
     device = sound()
     device.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda _: int(dialect.MAV_RESULT_IN_PROGRESS)
     run = Run(device).to()
@@ -155,13 +146,13 @@ def test_a_device_that_stays_in_progress_has_no_result() -> None:
 class SlyParachute(ParachuteDevice):
     """Wrong in a way that no first answer and no first status shows. does: in which."""
 
-    def __init__(self, does: str) -> None:
+    def __init__(self, does):
         super().__init__(ParachuteSettings(), [])
         self.does, self._at = does, math.inf
         right = self.commands[dialect.MAV_CMD_DO_PARACHUTE]
         self.commands[dialect.MAV_CMD_DO_PARACHUTE] = lambda params: self._do(params, right)
 
-    def _do(self, params: Params, right: Callable[[Params], int]) -> int:
+    def _do(self, params, right):
         result = right(params)
         late = {
             "releases after its refusal": dialect.MAV_RESULT_FAILED,
@@ -176,11 +167,11 @@ class SlyParachute(ParachuteDevice):
             self.armed = TriggerFlags(0)
         return result
 
-    def carry_out(self, command: object) -> int:
-        if command.get_type() != "COMMAND_INT":  # type: ignore[attr-defined]
+    def carry_out(self, command):
+        if command.get_type() != "COMMAND_INT":
             return super().carry_out(command)
-        params = (command.param1, command.param2, *[0.0] * 5)  # type: ignore[attr-defined]
-        number = command.command  # type: ignore[attr-defined]
+        params = (command.param1, command.param2, *[0.0] * 5)
+        number = command.command
         if number == dialect.MAV_CMD_SET_PARACHUTE_ARM and self.does == "arms without the mask":
             self.armed = TriggerFlags(int(params[0]))
             return int(dialect.MAV_RESULT_ACCEPTED)
@@ -189,7 +180,7 @@ class SlyParachute(ParachuteDevice):
             return int(dialect.MAV_RESULT_FAILED)
         return self.commands[number](params)
 
-    def step(self, now: float) -> None:
+    def step(self, now):
         super().step(now)
         if now >= self._at:
             self._at = math.inf
@@ -200,7 +191,7 @@ class SlyParachute(ParachuteDevice):
         if self.deployment is not DeploymentTrigger.NONE and self.does == "reports no more":
             self._due.pop(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS, None)
 
-    def next_step(self) -> float:
+    def next_step(self):
         return self._at
 
 
@@ -217,11 +208,11 @@ class SlyParachute(ParachuteDevice):
         ("reports no more", "released-stays"),
     ],
 )
-def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
+def test_what_shows_at_a_second_look_fails(does, clause):
     assert Run(SlyParachute(does)).to().of(Verdict.FAILED) == [clause]
 
 
-def test_a_device_that_obeys_command_int_as_well_passes() -> None:
+def test_a_device_that_obeys_command_int_as_well_passes():
     assert Run(SlyParachute("")).to().of(Verdict.FAILED) == []
 
 
@@ -232,7 +223,7 @@ COMMANDS = [*sound().commands]
 
 
 @pytest.mark.parametrize("stream", STREAMS)
-def test_a_device_that_sends_one_message_never_is_tried_to_the_end(stream: int) -> None:
+def test_a_device_that_sends_one_message_never_is_tried_to_the_end(stream):
     device = sound()
     del device.streams[stream]
     device.default_intervals.pop(stream, None)
@@ -248,9 +239,7 @@ RESULTS = [None, 0, 2, 3, 5, 200]
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("result", RESULTS)
-def test_a_device_that_answers_one_command_with_anything_is_tried_to_the_end(
-    command: int, result: int | None
-) -> None:
+def test_a_device_that_answers_one_command_with_anything_is_tried_to_the_end(command, result):
     device = sound()
     if result is None:
         del device.commands[command]
@@ -264,7 +253,7 @@ RANGES = {"uint8_t": 2**8, "uint16_t": 2**16, "uint32_t": 2**32, "uint64_t": 2**
 
 @settings(max_examples=60)
 @given(data=st.data())
-def test_a_device_with_any_value_in_a_field_is_tried_to_the_end(data: st.DataObject) -> None:
+def test_a_device_with_any_value_in_a_field_is_tried_to_the_end(data):
     device = sound()
     stream = data.draw(st.sampled_from(STREAMS))
     kind = dialect.mavlink_map[stream]
@@ -278,7 +267,7 @@ def test_a_device_with_any_value_in_a_field_is_tried_to_the_end(data: st.DataObj
     told = cycle(data.draw(st.lists(values, min_size=1, max_size=4)))
     make = device.streams[stream]
 
-    def changed() -> object:
+    def changed():
         message = make()
         setattr(message, field, next(told))
         return message
@@ -292,7 +281,7 @@ def test_a_device_with_any_value_in_a_field_is_tried_to_the_end(data: st.DataObj
 # -- what it must not do ------------------------------------------------------------------------
 
 
-def commands_in(sent: list[bytes]) -> set[tuple[int, float]]:
+def commands_in(sent):
     """(command, first parameter) of all that a device could take from these bytes."""
     decoder = FrameDecoder()
     frames = [frame for data in sent for frame in decoder.feed_datagram(data, 0.0)]
@@ -301,7 +290,7 @@ def commands_in(sent: list[bytes]) -> set[tuple[int, float]]:
 
 
 @pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
-def test_what_was_not_allowed_is_never_sent(risk: Risk) -> None:
+def test_what_was_not_allowed_is_never_sent(risk):
     run = Run(sound(), risk).to()
     sent = commands_in(run.line.sent)
     arms = {one for one in sent if one[0] == dialect.MAV_CMD_SET_PARACHUTE_ARM}
@@ -317,14 +306,14 @@ def test_what_was_not_allowed_is_never_sent(risk: Risk) -> None:
 
 
 @pytest.mark.parametrize("action", [dialect.PARACHUTE_RELEASE, 9.0, -1.0, math.nan, 1.5])
-def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(action: float) -> None:
+def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(action):
     bench = MavlinkBench(Risk.ARMS)
     with pytest.raises(NotAllowedError):
         bench.send(bench.command_long(dialect.MAV_CMD_DO_PARACHUTE, action))
     assert bench.take_output() == []
 
 
-def test_an_abort_leaves_the_device_disarmed() -> None:
+def test_an_abort_leaves_the_device_disarmed():
     """Given a Ctrl-C while sources are armed."""
     run = Run(sound())
     run.to(lambda: bool(run.device.armed))
@@ -337,7 +326,7 @@ def test_an_abort_leaves_the_device_disarmed() -> None:
 
 
 @pytest.mark.parametrize("name", ["set-interval", "interval-stop"])
-def test_a_status_that_was_set_otherwise_comes_as_before_in_the_end(name: str) -> None:
+def test_a_status_that_was_set_otherwise_comes_as_before_in_the_end(name):
     """Given a Ctrl-C as it is tried, and a device that takes no default interval."""
     device = sound()
     command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
@@ -358,7 +347,7 @@ def test_a_status_that_was_set_otherwise_comes_as_before_in_the_end(name: str) -
     assert device.after_acknowledgement[-1].interval_us == 1_000_000
 
 
-def test_a_device_that_was_sent_nothing_that_arms_is_not_disarmed() -> None:
+def test_a_device_that_was_sent_nothing_that_arms_is_not_disarmed():
     """Given one that falls silent before the first such command, though it is allowed."""
     run = Run(sound()).silenced()
     assert "PARACHUTE_STATUS" not in run.problem
@@ -366,7 +355,7 @@ def test_a_device_that_was_sent_nothing_that_arms_is_not_disarmed() -> None:
     assert not any(f"command={dialect.MAV_CMD_SET_PARACHUTE_ARM}" in one for one in sent)
 
 
-def test_a_device_that_cannot_be_disarmed_is_named() -> None:
+def test_a_device_that_cannot_be_disarmed_is_named():
     """Given one that stops to answer, armed."""
     run = Run(sound())
     run.to(lambda: bool(run.device.armed))
@@ -378,7 +367,7 @@ def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     assert run.problem == f"aborted by Ctrl-C; {left}"
 
 
-def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
+def test_a_device_that_vanishes_armed_may_be_left_armed():
     run = Run(sound())
     run.to(lambda: bool(run.device.armed))
     run.device.act("silent")
@@ -386,7 +375,7 @@ def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
     assert run.problem.endswith("the device: it may be LEFT ARMED: no PARACHUTE_STATUS shows it")
 
 
-def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
+def test_a_device_that_falls_silent_is_not_blamed_for_what_follows():
     """Given one that dies of the last bytes that are no frame."""
     device = sound()
     run = Run(device)
@@ -401,7 +390,7 @@ def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
     assert run.problem.startswith(told)
 
 
-def test_a_device_that_starts_anew_in_the_middle_fails_the_clause_that_was_tried() -> None:
+def test_a_device_that_starts_anew_in_the_middle_fails_the_clause_that_was_tried():
     """Given one that is switched off and on while it is listened to."""
     device = sound()
     run = Run(device, Risk.NONE)
@@ -413,7 +402,7 @@ def test_a_device_that_starts_anew_in_the_middle_fails_the_clause_that_was_tried
     assert run.problem == ""
 
 
-def test_where_no_parachute_is_heard_it_tells_who_is() -> None:
+def test_where_no_parachute_is_heard_it_tells_who_is():
     device = sound(component_id=42)
     device.streams[dialect.MAVLINK_MSG_ID_HEARTBEAT] = lambda: dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_GIMBAL, 8, 0, 0, 4, 3

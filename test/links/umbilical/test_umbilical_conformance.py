@@ -1,9 +1,6 @@
 """The kit on the simulated flight computer, sound and broken in each clause, in virtual time."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Hashable
 from itertools import cycle
 
 import pytest
@@ -33,31 +30,25 @@ OPTIONS = (REBOOT, WIPE)
 class Run(KitRun):
     """Kit and flight computer on one cable."""
 
-    def __init__(
-        self,
-        device: FlightComputer,
-        risk: Risk = Risk.FIRES,
-        options: tuple[str, ...] = OPTIONS,
-        session: Session[UmbilicalBench] | None = None,
-    ) -> None:
+    def __init__(self, device, risk=Risk.FIRES, options=OPTIONS, session=None):
         bench = UmbilicalBench(device.layout, risk, options)
         super().__init__(session or Session(bench, CLAUSES, Allowed(risk, options)), device)
 
 
-def sound(layout: str = REFERENCE.name, **knobs: object) -> FlightComputer:
-    return FlightComputer(FlightComputerSettings(**knobs), LAYOUTS[layout])  # type: ignore[arg-type]
+def sound(layout=REFERENCE.name, **knobs):
+    return FlightComputer(FlightComputerSettings(**knobs), LAYOUTS[layout])
 
 
-def simulated(broken: str) -> Run:
+def simulated(broken):
     """As the kit has it for its evidence."""
     line = KIT.virtual(broken)
-    return Run(line.device, session=line.session).to()  # type: ignore[arg-type]
+    return Run(line.device, session=line.session).to()
 
 
 # -- what it finds ------------------------------------------------------------------------------
 
 
-def test_a_sound_device_passes_all_that_can_be_tried() -> None:
+def test_a_sound_device_passes_all_that_can_be_tried():
     run = simulated("")
     assert run.of(Verdict.FAILED) == []
     unseen = ["heartbeat-timeout"]
@@ -68,7 +59,7 @@ def test_a_sound_device_passes_all_that_can_be_tried() -> None:
     assert run.device.mode is ComputerMode.Startup
 
 
-def test_what_restarts_and_wipes_passes_with_its_options() -> None:
+def test_what_restarts_and_wipes_passes_with_its_options():
     """Given a flight computer with a snapshot of an earlier flight in its FRAM."""
     device = sound()
     device.memory.snapshot("of a flight before")
@@ -77,7 +68,7 @@ def test_what_restarts_and_wipes_passes_with_its_options() -> None:
     assert run.of(Verdict.NOT_TRIED) == ["heartbeat-timeout", "soak"]
 
 
-def test_what_a_log_tells_of_the_connection_is_tried() -> None:
+def test_what_a_log_tells_of_the_connection_is_tried():
     """Given a flight computer in debug mode, which takes 15 s for its limit."""
     run = Run(sound(debug=True)).to()
     assert run.of(Verdict.FAILED) == []
@@ -85,7 +76,7 @@ def test_what_a_log_tells_of_the_connection_is_tried() -> None:
 
 
 @pytest.mark.parametrize("layout", [*LAYOUTS])
-def test_a_firmware_of_another_layout_passes_with_its_name(layout: str) -> None:
+def test_a_firmware_of_another_layout_passes_with_its_name(layout):
     run = Run(sound(layout)).to()
     assert run.of(Verdict.FAILED) == []
     assert run.results["field-count"].verdict is Verdict.PASSED
@@ -93,7 +84,7 @@ def test_a_firmware_of_another_layout_passes_with_its_name(layout: str) -> None:
     assert (run.results["target"].verdict is Verdict.PASSED) == shows_target
 
 
-def test_a_firmware_of_another_layout_is_told_without_its_name() -> None:
+def test_a_firmware_of_another_layout_is_told_without_its_name():
     """Given 54 fields, and a kit that was told of the reference's 57."""
     bench = UmbilicalBench(REFERENCE)
     run = Run(sound("telem54"), session=Session(bench, CLAUSES, Allowed())).to()
@@ -103,20 +94,20 @@ def test_a_firmware_of_another_layout_is_told_without_its_name() -> None:
     assert [*run.results] == NAMES
 
 
-def test_a_firmware_that_vents_by_safe_fails_in_that() -> None:
+def test_a_firmware_that_vents_by_safe_fails_in_that():
     """Given the known firmware, whose <V> opens the SV; it is left closed all the same."""
     run = Run(sound(safe_opens_sv=True)).to()
     assert run.of(Verdict.FAILED) == ["safe"]
     assert run.problem == ""
 
 
-def test_a_firmware_that_wants_its_flash_wiped_is_not_armed() -> None:
+def test_a_firmware_that_wants_its_flash_wiped_is_not_armed():
     run = Run(sound(interlock=True), Risk.ARMS, ()).to()
     assert run.of(Verdict.FAILED) == []
     assert run.results["key-arm"].why == "it says: Arming blocked: wipe flash first"
 
 
-def test_each_clause_has_a_way_to_be_broken() -> None:
+def test_each_clause_has_a_way_to_be_broken():
     assert sorted(BREAKS) == sorted(NAMES)
 
 
@@ -129,12 +120,12 @@ class WaywardComputer(FlightComputer):
     does = ""
     _since = math.inf
 
-    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+    def receive(self, data, now, stream=None):
         if self.does == "takes a newline for a bracket":
             data = data.replace(b"\n", b">")
         super().receive(data, now, stream)
 
-    def _telemetry(self) -> None:
+    def _telemetry(self):
         flags = self.flight.flags
         if flags.get(self.does):
             self._since = min(self._since, self.now)
@@ -157,13 +148,13 @@ class WaywardComputer(FlightComputer):
         ("", []),
     ],
 )
-def test_what_shows_at_a_second_look_fails(does: str, clauses: list[str]) -> None:
+def test_what_shows_at_a_second_look_fails(does, clauses):
     device = WaywardComputer(FlightComputerSettings(), REFERENCE)
     device.does = does
     assert Run(device).to().of(Verdict.FAILED) == clauses
 
 
-def test_a_magnetometer_in_gauss_fails() -> None:
+def test_a_magnetometer_in_gauss_fails():
     device = sound()
     device.overrides |= {"mag_x": 0.1825, "mag_y": -0.048, "mag_z": -0.476}
     assert Run(device).to().of(Verdict.FAILED) == ["magnetometer"]
@@ -173,7 +164,7 @@ def test_a_magnetometer_in_gauss_fails() -> None:
 
 
 @pytest.mark.parametrize("name", [*KINDS])
-def test_a_device_without_one_command_is_tried_to_the_end(name: str) -> None:
+def test_a_device_without_one_command_is_tried_to_the_end(name):
     device = sound()
     token = KINDS[name].command.token.decode()
     device.flight.handlers.pop(token, None)
@@ -198,14 +189,12 @@ NUMBERS = st.one_of(
         max_size=4,
     )
 )
-def test_a_device_with_any_texts_in_its_fields_is_tried_to_the_end(
-    told: dict[str, list[str]],
-) -> None:
+def test_a_device_with_any_texts_in_its_fields_is_tried_to_the_end(told):
     device = sound()
     every = {REFERENCE.index[field]: cycle(texts) for field, texts in told.items()}
     put_line = device.queue.put_line
 
-    def changed(text: str, now: float) -> None:
+    def changed(text, now):
         if text.startswith("$TELEM,"):
             mark, *texts = text.split(",")
             for place, told_there in every.items():
@@ -213,30 +202,28 @@ def test_a_device_with_any_texts_in_its_fields_is_tried_to_the_end(
             text = ",".join([mark, *texts])
         put_line(text, now)
 
-    device.queue.put_line = changed  # type: ignore[method-assign]
+    device.queue.put_line = changed
     assert [*Run(device).to().results] == NAMES
 
 
 @settings(max_examples=8)
 @given(lines=st.lists(st.binary(max_size=90), min_size=1, max_size=5))
-def test_a_device_that_sends_any_bytes_besides_is_tried_to_the_end(lines: list[bytes]) -> None:
+def test_a_device_that_sends_any_bytes_besides_is_tried_to_the_end(lines):
     device = sound()
     every, take = cycle(lines), device.queue.take
 
-    def more(now: float) -> list[bytes]:
+    def more(now):
         gone = take(now)
         return [next(every), *gone] if gone else []
 
-    device.queue.take = more  # type: ignore[method-assign]
+    device.queue.take = more
     # What hides all of its telemetry is not found.
     assert [*Run(device).to().results] in (NAMES, [])
 
 
 @settings(max_examples=6)
 @given(cut=st.floats(0.0, 0.6), garbage=st.floats(0.0, 1.0), seed=st.integers(0, 99))
-def test_a_cable_that_damages_lines_is_tried_to_the_end(
-    cut: float, garbage: float, seed: int
-) -> None:
+def test_a_cable_that_damages_lines_is_tried_to_the_end(cut, garbage, seed):
     run = Run(sound(cut=cut, garbage=garbage, seed=seed)).to()
     assert [*run.results] == NAMES
 
@@ -244,7 +231,7 @@ def test_a_cable_that_damages_lines_is_tried_to_the_end(
 # -- what it must not do ------------------------------------------------------------------------
 
 
-def sent_by(run: Run) -> set[str]:
+def sent_by(run):
     """The commands of the reference that were sent, by their names."""
     return {name for name, kind in KINDS.items() if kind.command.token in run.line.sent}
 
@@ -256,7 +243,7 @@ ASKS = {"heartbeat", "flash_info", "dump_fram", "dump_flash"}
 
 @pytest.mark.parametrize("options", [(), (REBOOT,), (WIPE,)])
 @pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
-def test_what_was_not_allowed_is_never_sent(risk: Risk, options: tuple[str, ...]) -> None:
+def test_what_was_not_allowed_is_never_sent(risk, options):
     run = Run(sound(), risk, options).to()
     wanted = ASKS | (ARMS if risk is Risk.ARMS else set())
     wanted |= {"reboot"} if REBOOT in options else set()
@@ -270,7 +257,7 @@ def test_what_was_not_allowed_is_never_sent(risk: Risk, options: tuple[str, ...]
     assert max(one.risk for one in tried) == risk
 
 
-def test_what_it_changed_is_set_back() -> None:
+def test_what_it_changed_is_set_back():
     """Given a flight computer with a target."""
     device = sound()
     run = Run(device, Risk.NONE, ())
@@ -286,7 +273,7 @@ MORE_THAN_ARMS = ["<L>", "<M>", "<S>", "<D>", "<d>", "<1>", "<A3>", "<W>", "<F>"
 
 @pytest.mark.parametrize("form", ["%s", "x%s", "(%s)", "%s%s", "<H>%s"])
 @pytest.mark.parametrize("token", MORE_THAN_ARMS)
-def test_a_trial_that_would_do_more_unasked_ends_in_our_own_error(token: str, form: str) -> None:
+def test_a_trial_that_would_do_more_unasked_ends_in_our_own_error(token, form):
     bench = UmbilicalBench(REFERENCE, Risk.ARMS)
     bench.at(1.0)
     for text in (token, token[1:-1], token.swapcase()):
@@ -298,7 +285,7 @@ def test_a_trial_that_would_do_more_unasked_ends_in_our_own_error(token: str, fo
     assert bench.take_output() == []
 
 
-def test_two_writes_are_never_closer_than_the_receiver_can_take() -> None:
+def test_two_writes_are_never_closer_than_the_receiver_can_take():
     """Given a flight computer that sleeps 0.1 s after each command."""
     device = sound()
     Run(device, Risk.NONE, ()).to()
@@ -318,7 +305,7 @@ def test_two_writes_are_never_closer_than_the_receiver_can_take() -> None:
         (Risk.FIRES, lambda device: device.mode is ComputerMode.Ascent),
     ],
 )
-def test_an_abort_leaves_it_safe(risk: Risk, reached: Callable[[FlightComputer], bool]) -> None:
+def test_an_abort_leaves_it_safe(risk, reached):
     """Given a Ctrl-C while it is armed, a valve is open, or it is launched."""
     device = sound()
     run = Run(device, risk, ())
@@ -331,7 +318,7 @@ def test_an_abort_leaves_it_safe(risk: Risk, reached: Callable[[FlightComputer],
     assert run.problem == "aborted by Ctrl-C"
 
 
-def test_heartbeats_go_on_after_an_abort_in_a_while_without() -> None:
+def test_heartbeats_go_on_after_an_abort_in_a_while_without():
     """Given a Ctrl-C while it is tried how long the connection lasts."""
     device = sound()
     run = Run(device, Risk.ARMS, ())
@@ -342,7 +329,7 @@ def test_heartbeats_go_on_after_an_abort_in_a_while_without() -> None:
     assert run.line.now - device.heartbeats[-1] < 1.0
 
 
-def test_a_device_that_cannot_be_disarmed_is_named() -> None:
+def test_a_device_that_cannot_be_disarmed_is_named():
     device = sound()
     run = Run(device, Risk.ARMS, ())
     run.to(lambda: device.mode is ComputerMode.Standby)
@@ -353,13 +340,13 @@ def test_a_device_that_cannot_be_disarmed_is_named() -> None:
     assert run.problem.startswith(f"aborted by Ctrl-C; {left}")
 
 
-def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed() -> None:
+def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed():
     """Given one that falls silent before the first such command, though it is allowed."""
     run = Run(sound()).silenced()
     assert "LEFT" not in run.problem
 
 
-def test_a_device_that_vanishes_without_heartbeats_may_be_left_with_open_valves() -> None:
+def test_a_device_that_vanishes_without_heartbeats_may_be_left_with_open_valves():
     """Given one that falls silent while it is tried how long the connection lasts: some open the
     SV then."""
     device = sound()
@@ -370,7 +357,7 @@ def test_a_device_that_vanishes_without_heartbeats_may_be_left_with_open_valves(
     assert "its valves open: no telemetry shows it" in run.problem
 
 
-def test_a_device_whose_state_cannot_be_seen_is_named() -> None:
+def test_a_device_whose_state_cannot_be_seen_is_named():
     """Given one that falls silent while a valve is open."""
     device = sound()
     run = Run(device)
@@ -381,7 +368,7 @@ def test_a_device_whose_state_cannot_be_seen_is_named() -> None:
     assert not device.flight.flags["sv_open"], "closed all the same"
 
 
-def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
+def test_a_device_that_falls_silent_is_not_blamed_for_what_follows():
     device = sound()
     run = Run(device, Risk.NONE, ())
     run.to(lambda: "unknown" in run.results)
@@ -393,7 +380,7 @@ def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
     assert run.problem.startswith(told)
 
 
-def test_where_no_telemetry_is_received_nothing_is_tried() -> None:
+def test_where_no_telemetry_is_received_nothing_is_tried():
     run = Run(device := sound())
     run.to(lambda: bool(device.heartbeats))
     device.act("silent")
@@ -403,7 +390,7 @@ def test_where_no_telemetry_is_received_nothing_is_tried() -> None:
     assert not any(isinstance(one, DeviceFound) for one in run.line.events)
 
 
-def test_a_soak_of_a_device_that_starts_anew_fails() -> None:
+def test_a_soak_of_a_device_that_starts_anew_fails():
     device = sound()
     clauses = [one for one in CLAUSES if one.needs == SOAK]
     bench = UmbilicalBench(REFERENCE, soak=30.0)

@@ -1,15 +1,11 @@
 """The kit on the simulated UPF controller and trigger, sound and broken in each clause, in virtual
 time."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -17,7 +13,7 @@ from hypothesis import strategies as st
 from kit_run import KitRun
 
 from chute_ros.conformance.bench import NotAllowedError
-from chute_ros.conformance.clause import SOAK, Clause, Risk, Verdict
+from chute_ros.conformance.clause import SOAK, Risk, Verdict
 from chute_ros.conformance.session import Allowed, Session
 from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import (
@@ -46,7 +42,6 @@ from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
-from chute_ros.protocol.dronecan.endpoint import ReceivedTransfer
 from chute_ros.transport.data_types import load_data_types
 
 NAMES = [one.name for one in CLAUSES]
@@ -58,7 +53,7 @@ OTHER_TYPES = Path(__file__).parents[2] / "dsdl_other" / "flyfire"
 class Run(KitRun):
     """A controller, a trigger and the kit on one bus. options: what is given."""
 
-    def __init__(self, risk: Risk, *options: str, definitions: Definitions = DEFINITIONS) -> None:
+    def __init__(self, risk, *options, definitions=DEFINITIONS):
         self.controller, self.trigger = UpfController(definitions), UpfTrigger(definitions)
         device = A_TRIGGER if TRIGGER in options else A_CONTROLLER
         self.bench = UpfBench(definitions, risk, device=device)
@@ -67,11 +62,11 @@ class Run(KitRun):
 
 
 def tried(
-    *nodes: UpfNode,
-    options: tuple[str, ...] = (),
-    clauses: Sequence[Clause[UpfBench]] = CLAUSES,
-    **bench: Any,
-) -> KitRun:
+    *nodes,
+    options=(),
+    clauses=CLAUSES,
+    **bench,
+):
     """The kit on these nodes, to its end; it may do all."""
     session = Session(
         UpfBench(DEFINITIONS, Risk.FIRES, **bench), clauses, Allowed(Risk.FIRES, options)
@@ -80,7 +75,7 @@ def tried(
 
 
 @pytest.mark.parametrize("given", [(SOAK,), (DNA,), (TRIGGER, SOAK), (TRIGGER, DNA)])
-def test_a_sound_device_passes_all_that_is_allowed(given: tuple[str, ...]) -> None:
+def test_a_sound_device_passes_all_that_is_allowed(given):
     device, bench = KIT.simulated("", " ".join(given))
     run = KitRun(Session(bench, CLAUSES, Allowed(Risk.FIRES, given)), device).to()
     met = [one for one in CLAUSES if {*one.needs.split()} <= {*given} and not one.out_of_reach]
@@ -90,11 +85,11 @@ def test_a_sound_device_passes_all_that_is_allowed(given: tuple[str, ...]) -> No
     assert run.problem == ""
 
 
-def test_each_clause_has_a_way_to_be_broken() -> None:
+def test_each_clause_has_a_way_to_be_broken():
     assert sorted(BREAKS) == sorted(IN_REACH)
 
 
-def test_what_no_bench_can_show_is_not_tried_and_has_a_reason() -> None:
+def test_what_no_bench_can_show_is_not_tried_and_has_a_reason():
     line = KIT.virtual("")
     told = KitRun(line.session, line.device).to().results
     rows = [told[one] for one in NAMES if one not in IN_REACH]
@@ -102,7 +97,7 @@ def test_what_no_bench_can_show_is_not_tried_and_has_a_reason() -> None:
     assert all(one.why for one in rows)
 
 
-def test_a_fault_that_comes_while_it_is_tried_has_it_ask_for_a_flight_block() -> None:
+def test_a_fault_that_comes_while_it_is_tried_has_it_ask_for_a_flight_block():
     run = Run(Risk.NONE)
     run.to(lambda: run.controller.state is ParachuteState.READY)
     ready = run.line.now
@@ -115,7 +110,7 @@ def test_a_fault_that_comes_while_it_is_tried_has_it_ask_for_a_flight_block() ->
     assert run.results["block-when-abnormal"].verdict is Verdict.PASSED
 
 
-def test_one_that_is_fired_by_force_is_not_fired_by_the_other_request_as_well() -> None:
+def test_one_that_is_fired_by_force_is_not_fired_by_the_other_request_as_well():
     run = Run(Risk.FIRES, DEPLOY_FORCE)
     run.to()
     assert run.of(Verdict.FAILED) == []
@@ -132,33 +127,33 @@ _S = ParachuteState
 class SlyController(UpfController):
     """Wrong in a way that no first answer shows. does: in which."""
 
-    def __init__(self, does: str) -> None:
+    def __init__(self, does):
         super().__init__(DEFINITIONS, ControllerSettings(self_test=2.0))
         self.does, self._asks_at = does, math.inf
         if does == "says that it saves":
             self.services[bus_requests.EXECUTE_OPCODE] = lambda _: {"ok": True}
             right = self.memory.set
 
-            def keep(name: str, wanted: p.Value) -> bool:
+            def keep(name, wanted):
                 saved = dict(self.memory.saved)
                 done = right(name, wanted)
                 if name == p.AUTO_SAVE and not wanted:
                     self.memory.saved = saved
                 return done
 
-            self.memory.set = keep  # type: ignore[method-assign]
+            self.memory.set = keep
         if does == "takes node id 200":
             answer, most = self.memory.answer, {"max_value": {"integer_value": 200}}
-            self.memory.answer = lambda name: {  # type: ignore[method-assign]
+            self.memory.answer = lambda name: {
                 **answer(name),
                 **(most if name == p.STATIC_NODE_ID else {}),
             }
 
-    def reboot(self) -> None:
+    def reboot(self):
         super().reboot()
         self._asks_at = self.now + 0.5
 
-    def receive(self, data: bytes, now: float) -> None:
+    def receive(self, data, now):
         frame = unpack(data)
         if (
             self.does == "takes two nodes for one"
@@ -168,7 +163,7 @@ class SlyController(UpfController):
             data = pack(replace(frame, identifier=frame.identifier & ~0x7F | VEHICLE))
         super().receive(data, now)
 
-    def decide(self, name: str) -> str:
+    def decide(self, name):
         if self.does == "forces without the kill switch" and name == "TYPE_DEPLOY_FORCE":
             self._fire(self.now)
             return "SUCCESS"
@@ -183,14 +178,14 @@ class SlyController(UpfController):
                 return "REJECTED"
         return result
 
-    def launch(self, cause: str, by_aps: bool = False) -> None:
+    def launch(self, cause, by_aps=False):
         if self.does == "commands its trigger first":
             values = self.definitions.request(names.TRIGGER_SERVICE, "TYPE_LAUNCH")
             for node_id in self._peers.triggers:
                 self._start(Call(node_id, names.TRIGGER_SERVICE, values, 2))
         super().launch(cause, by_aps)
 
-    def step(self, now: float) -> None:
+    def step(self, now):
         super().step(now)
         early = self.does == "releases the block early" and self.state is _S.NOT_READY
         again = self.does == "blocks while READY" and self.state is _S.READY
@@ -213,19 +208,19 @@ class SlyController(UpfController):
         ("takes two nodes for one", "two-senders"),
     ],
 )
-def test_what_shows_at_a_second_look_fails(does: str, clause: str) -> None:
+def test_what_shows_at_a_second_look_fails(does, clause):
     run = tried(SlyController(does), UpfTrigger(DEFINITIONS))
     assert run.of(Verdict.FAILED) == [clause]
 
 
-def test_a_forced_deploy_without_the_kill_switch_fails() -> None:
+def test_a_forced_deploy_without_the_kill_switch_fails():
     controller = SlyController("forces without the kill switch")
     clauses = [one for one in CLAUSES if one.name != "disabled"]
     run = tried(controller, UpfTrigger(DEFINITIONS), options=(DEPLOY_FORCE,), clauses=clauses)
     assert run.of(Verdict.FAILED) == ["kill-first"]
 
 
-def test_a_launch_before_a_trigger_that_seldom_reports_fails() -> None:
+def test_a_launch_before_a_trigger_that_seldom_reports_fails():
     trigger = UpfTrigger(DEFINITIONS)
     trigger.status_interval = 1.0
     controller = simulated_controller(DEFINITIONS, ControllerSettings(), "launched-after-trigger")
@@ -238,11 +233,11 @@ class ForgetfulTrigger(UpfTrigger):
     then = ""
     _fired_at = math.inf
 
-    def fire(self, cause: str) -> None:
+    def fire(self, cause):
         super().fire(cause)
         self._fired_at = min(self._fired_at, self.now)
 
-    def step(self, now: float) -> None:
+    def step(self, now):
         super().step(now)
         if now >= self._fired_at + 1.0 and self.fired:
             if self.then == "says no more":
@@ -252,7 +247,7 @@ class ForgetfulTrigger(UpfTrigger):
 
 
 @pytest.mark.parametrize("then", ["says no more", "says that it has not"])
-def test_a_trigger_that_forgets_that_it_has_fired_fails(then: str) -> None:
+def test_a_trigger_that_forgets_that_it_has_fired_fails(then):
     device = ForgetfulTrigger(DEFINITIONS)
     device.then = then
     run = tried(device, options=(TRIGGER,), device=A_TRIGGER)
@@ -262,26 +257,26 @@ def test_a_trigger_that_forgets_that_it_has_fired_fails(then: str) -> None:
 # -- whatever it is told -------------------------------------------------------------------------
 
 
-def whole(run: KitRun) -> None:
+def whole(run):
     """Each clause has its verdict: whatever a device says, or does not, is no mistake of ours."""
     assert [*run.to().results] == NAMES
     assert run.of(Verdict.FAILED)
 
 
 @pytest.mark.parametrize("service", [*UpfController(DEFINITIONS).services])
-def test_a_controller_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
+def test_a_controller_that_answers_one_service_never_is_tried_to_the_end(service):
     run = Run(Risk.FIRES)
     del run.controller.services[service]
     whole(run)
 
 
-def test_a_controller_without_node_status_is_tried_to_the_end() -> None:
+def test_a_controller_without_node_status_is_tried_to_the_end():
     run = Run(Risk.FIRES)
     del run.controller.broadcasts[NODE_STATUS]
     whole(run)
 
 
-def test_a_touchdown_of_a_launch_that_nobody_saw_proves_nothing() -> None:
+def test_a_touchdown_of_a_launch_that_nobody_saw_proves_nothing():
     """Given a controller that is TOUCHDOWN already as the kit comes."""
     run = Run(Risk.FIRES)
     run.to(lambda: run.controller.state is ParachuteState.TOUCHDOWN)
@@ -303,11 +298,11 @@ VALUES: st.SearchStrategy[p.Value | None] = st.one_of(
 
 @settings(max_examples=5)
 @given(told=st.fixed_dictionaries({one.name: VALUES for one in p.PARAMETERS}))
-def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Value | None]) -> None:
+def test_a_controller_with_any_values_is_tried_to_the_end(told):
     run = Run(Risk.NONE)
     right = run.controller.services[bus_requests.GET_SET]
 
-    def answer(request: ReceivedTransfer) -> dict[str, object] | None:
+    def answer(request):
         name = bytes(request.values["name"]).decode()
         if name not in told:
             return right(request)
@@ -324,9 +319,7 @@ def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Valu
     states=st.lists(st.integers(0, 7), min_size=1),
     uptimes=st.lists(st.integers(0, 2**32 - 1), min_size=1),
 )
-def test_a_controller_with_any_states_is_tried_to_the_end(
-    states: list[int], uptimes: list[int]
-) -> None:
+def test_a_controller_with_any_states_is_tried_to_the_end(states, uptimes):
     run = Run(Risk.FIRES)
     for message, field, every in (
         (names.PARACHUTE_STATUS, "state", cycle(states)),
@@ -339,25 +332,23 @@ def test_a_controller_with_any_states_is_tried_to_the_end(
     assert [*run.results] == NAMES
 
 
-def _changed(
-    make: Callable[[], dict[str, object]], field: str, every: Iterator[int]
-) -> dict[str, object]:
+def _changed(make, field, every):
     return {**make(), field: next(every)}
 
 
-def _clamps(controller: UpfController, low: int, high: int) -> None:
+def _clamps(controller, low, high):
     """It takes the nearest value in place of one that is out of its range."""
     right = controller.memory.set
 
-    def clamp(name: str, wanted: p.Value) -> bool:
+    def clamp(name, wanted):
         if name == p.NODE_STATUS_INTERVAL and isinstance(wanted, (int, float)):
             wanted = min(max(wanted, low), high)
         return right(name, wanted)
 
-    controller.memory.set = clamp  # type: ignore[method-assign]
+    controller.memory.set = clamp
 
 
-def test_a_controller_that_takes_the_nearest_value_is_as_good_as_one_that_refuses() -> None:
+def test_a_controller_that_takes_the_nearest_value_is_as_good_as_one_that_refuses():
     run = Run(Risk.NONE)
     _clamps(run.controller, 2, 1000)
     run.to()
@@ -367,12 +358,12 @@ def test_a_controller_that_takes_the_nearest_value_is_as_good_as_one_that_refuse
     assert run.controller.values == CONTROLLER_PARAMETERS
 
 
-def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None:
+def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back():
     """Given a controller that takes 1 where it tells that 2 is the least."""
     run = Run(Risk.NONE)
     right = run.controller.services[bus_requests.GET_SET]
 
-    def answer(request: ReceivedTransfer) -> dict[str, object] | None:
+    def answer(request):
         wanted = p.value_of(request.values["value"])
         if isinstance(wanted, int) and wanted < 0:
             run.controller.memory.values[p.NODE_STATUS_INTERVAL] = 1
@@ -386,7 +377,7 @@ def test_a_value_beyond_the_limits_that_it_tells_fails_and_is_set_back() -> None
     assert run.problem == ""
 
 
-def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start() -> None:
+def test_one_that_says_yes_to_a_restart_and_goes_on_fails_soon_after_its_start():
     run = Run(Risk.NONE)
     run.controller.services[bus_requests.RESTART_NODE] = lambda _: None
     (restart,) = (one for one in CLAUSES if one.name == "restart")
@@ -399,19 +390,19 @@ class StartsLate(UpfNode):
 
     _restarts_at = math.inf
 
-    def reboot(self) -> None:
+    def reboot(self):
         if math.isnan(self.booted_at) or self.now >= self._restarts_at:
             self._restarts_at = math.inf
             super().reboot()
         else:
             self._restarts_at = self.now + 0.3
 
-    def step(self, now: float) -> None:
+    def step(self, now):
         if now >= self._restarts_at:
             self.reboot()
         super().step(now)
 
-    def next_step(self) -> float:
+    def next_step(self):
         return min(super().next_step(), self._restarts_at)
 
 
@@ -424,18 +415,18 @@ class LateRestart(StartsLate, UpfController):
 
     intervals = False
 
-    def reboot(self) -> None:
+    def reboot(self):
         super().reboot()
         if self.booted_at == self.now:
             self._at_start = dict(self.values)
 
-    def _interval(self, name: str) -> float:
+    def _interval(self, name):
         values = self._at_start if self.intervals else self.values
         return float(values[name]) / 1000.0
 
 
 @pytest.mark.parametrize("intervals", [False, True])
-def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
+def test_what_takes_a_restart_is_judged_after_it(intervals):
     device = LateRestart(DEFINITIONS)
     device.intervals = intervals
     session = Session(UpfBench(DEFINITIONS), CLAUSES, Allowed())
@@ -451,9 +442,7 @@ def test_what_takes_a_restart_is_judged_after_it(intervals: bool) -> None:
 
 
 @pytest.mark.parametrize("options", [(DNA,), (TRIGGER, DNA)])
-def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
-    options: tuple[str, ...],
-) -> None:
+def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(options):
     """Given a device that has no node id a moment after it has answered RestartNode."""
     if TRIGGER in options:
         nodes = LateTrigger(DEFINITIONS), UpfController(DEFINITIONS)
@@ -471,7 +460,7 @@ def test_one_that_restarts_late_is_given_a_node_id_and_has_its_own_again(
 
 
 @pytest.mark.parametrize("risk", list(Risk))
-def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk) -> None:
+def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk):
     run = Run(risk)
     run.to()
     assert run.controller.values == run.controller.saved == CONTROLLER_PARAMETERS
@@ -487,7 +476,7 @@ def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk)
 
 
 @pytest.mark.parametrize("risk", list(Risk))
-def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed(risk: Risk) -> None:
+def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed(risk):
     """Given one that vanishes with a harmless parameter changed."""
     run = Run(risk)
     run.to(lambda: bool(run.bench.changed))
@@ -499,7 +488,7 @@ def test_a_device_that_was_sent_nothing_that_arms_is_not_said_to_be_left_armed(r
     assert asked == []
 
 
-def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
+def test_a_device_that_vanishes_armed_may_be_left_armed():
     run = Run(Risk.ARMS)
     run.to(lambda: run.controller.state is ParachuteState.ARMED)
     run.controller.act("silent")
@@ -507,7 +496,7 @@ def test_a_device_that_vanishes_armed_may_be_left_armed() -> None:
     assert "it may be LEFT ARMED: no ParachuteStatus shows it" in run.problem
 
 
-def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
+def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were():
     run = Run(Risk.ARMS)
     run.to(lambda: run.controller.state is ParachuteState.ARMED)
     run.session.abort("aborted by Ctrl-C", run.line.now)
@@ -519,7 +508,7 @@ def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
 
 @pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.1])
 @pytest.mark.parametrize("name", ["dna", "dna-forgets", "trigger-dna", "trigger-dna-forgets"])
-def test_an_abort_gives_it_its_own_node_id_again(name: str, after: float) -> None:
+def test_an_abort_gives_it_its_own_node_id_again(name, after):
     """Given a Ctrl-C so long after its static node id became 0."""
     (clause,) = (one for one in CLAUSES if one.name == name)
     device, bench = KIT.simulated("", clause.needs)
@@ -535,7 +524,7 @@ def test_an_abort_gives_it_its_own_node_id_again(name: str, after: float) -> Non
     assert static == (TRIGGER_NODE_ID if TRIGGER in clause.needs else CONTROLLER_NODE_ID)
 
 
-def test_a_device_that_comes_back_without_a_node_id_is_named() -> None:
+def test_a_device_that_comes_back_without_a_node_id_is_named():
     """Given one that dies while it has none."""
     device, bench = KIT.simulated("", DNA)
     clauses = [one for one in CLAUSES if one.name == "dna"]
@@ -547,7 +536,7 @@ def test_a_device_that_comes_back_without_a_node_id_is_named() -> None:
 
 
 @pytest.mark.parametrize("risk", list(Risk))
-def test_its_node_id_is_not_taken_unasked(risk: Risk) -> None:
+def test_its_node_id_is_not_taken_unasked(risk):
     bench = UpfBench(DEFINITIONS, risk)
     bench.at(1.0)
     values = {"index": 0, "value": p.union_of(0), "name": p.STATIC_NODE_ID.encode()}
@@ -563,9 +552,7 @@ def test_its_node_id_is_not_taken_unasked(risk: Risk) -> None:
         (names.TRIGGER_SERVICE, "TYPE_LAUNCH"),
     ],
 )
-def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(
-    service: str, type_name: str
-) -> None:
+def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(service, type_name):
     bench = UpfBench(DEFINITIONS, Risk.ARMS)
     bench.at(1.0)
     for magic in ({}, {"magic_number": 1}):
@@ -584,7 +571,7 @@ FIRING = [one for one in CLAUSES if TRIGGER in one.needs and one.risk is Risk.FI
 
 
 @pytest.mark.parametrize("risk", list(Risk))
-def test_of_a_whole_parachute_the_trigger_alone_is_tried(risk: Risk) -> None:
+def test_of_a_whole_parachute_the_trigger_alone_is_tried(risk):
     """Given a controller on its bus."""
     run = Run(risk, TRIGGER)
     run.to()
@@ -598,7 +585,7 @@ def test_of_a_whole_parachute_the_trigger_alone_is_tried(risk: Risk) -> None:
     assert not any(f"node {CONTROLLER_NODE_ID}" in one for one in asked)
 
 
-def test_a_controller_is_not_taken_for_a_trigger() -> None:
+def test_a_controller_is_not_taken_for_a_trigger():
     """Given a bus without a trigger."""
     run = Run(Risk.FIRES, TRIGGER)
     run.bus.nodes.remove(run.trigger)
@@ -609,7 +596,7 @@ def test_a_controller_is_not_taken_for_a_trigger() -> None:
 
 
 @pytest.mark.parametrize("options", [(TRIGGER,), (TRIGGER, BROADCAST)])
-def test_where_several_would_fire_nothing_is_fired(options: tuple[str, ...]) -> None:
+def test_where_several_would_fire_nothing_is_fired(options):
     run = Run(Risk.FIRES, *options)
     values = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: 35}
     other = UpfTrigger(DEFINITIONS, NodeSettings("another trigger", values))
@@ -623,7 +610,7 @@ def test_where_several_would_fire_nothing_is_fired(options: tuple[str, ...]) -> 
     assert "(nodes 34, 35; need one)" in run.results["trigger-launch"].why
 
 
-def test_one_that_is_fired_by_the_broadcast_is_not_fired_by_the_service_as_well() -> None:
+def test_one_that_is_fired_by_the_broadcast_is_not_fired_by_the_service_as_well():
     run = Run(Risk.FIRES, TRIGGER, BROADCAST)
     run.to()
     assert run.results["trigger-broadcast"].verdict is Verdict.PASSED
@@ -635,7 +622,7 @@ def test_one_that_is_fired_by_the_broadcast_is_not_fired_by_the_service_as_well(
     ("action", "why"),
     [("trigger-fired", "it has fired already"), ("trigger-error", "it is ABNORMAL (need READY)")],
 )
-def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action: str, why: str) -> None:
+def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action, why):
     run = Run(Risk.FIRES, TRIGGER)
     run.trigger.add_action("trigger-fired", lambda _: run.trigger.fire("somebody"))
     run.trigger.act(action)
@@ -645,7 +632,7 @@ def test_one_that_cannot_fire_proves_nothing_about_what_fires_it(action: str, wh
     assert [one for one in met if not run.results[one].why.startswith(why)] == []
 
 
-def test_one_that_fires_by_itself_between_two_clauses_fails_once() -> None:
+def test_one_that_fires_by_itself_between_two_clauses_fails_once():
     run = Run(Risk.FIRES, TRIGGER)
     run.to(lambda: "trigger-unknown-type" in run.results)
     run.trigger.fire("itself")
@@ -655,7 +642,7 @@ def test_one_that_fires_by_itself_between_two_clauses_fails_once() -> None:
     assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
 
 
-def test_one_that_fires_late_by_the_broadcast_did_not_fire_by_itself() -> None:
+def test_one_that_fires_late_by_the_broadcast_did_not_fire_by_itself():
     run = Run(Risk.FIRES, TRIGGER, BROADCAST)
     run.trigger.act("trigger-stuck")
     run.to(lambda: "trigger-broadcast" in run.results)
@@ -666,12 +653,12 @@ def test_one_that_fires_late_by_the_broadcast_did_not_fire_by_itself() -> None:
     assert run.results["trigger-launch"].verdict is Verdict.NOT_TRIED
 
 
-def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_held() -> None:
+def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_held():
     """Given a trigger that falls silent, but for its NodeStatus."""
     run = Run(Risk.FIRES, TRIGGER)
     right = run.trigger.services[names.TRIGGER_SERVICE]
 
-    def serve(request: ReceivedTransfer) -> dict[str, object] | None:
+    def serve(request):
         del run.trigger.broadcasts[names.TRIGGER_STATUS]
         run.trigger.services[names.TRIGGER_SERVICE] = right
         return right(request)
@@ -681,7 +668,7 @@ def test_one_that_tells_nothing_more_after_a_wrong_request_is_not_said_to_have_h
     assert run.of(Verdict.FAILED) == ["trigger-bad-magic"]
 
 
-def test_a_refusal_to_launch_fails() -> None:
+def test_a_refusal_to_launch_fails():
     run = Run(Risk.FIRES, TRIGGER)
     run.trigger.act("refuse")
     run.to()
@@ -689,7 +676,7 @@ def test_a_refusal_to_launch_fails() -> None:
     assert run.results["trigger-launch"].why == "TYPE_LAUNCH: FAILED"
 
 
-def test_what_the_data_types_do_not_have_is_not_tried() -> None:
+def test_what_the_data_types_do_not_have_is_not_tried():
     """Given types of another vendor, with a launch that names no node, and no self test."""
     definitions = Definitions(load_data_types(str(OTHER_TYPES), "--dsdl-path"))
     run = Run(Risk.FIRES, TRIGGER, definitions=definitions)
@@ -701,7 +688,7 @@ def test_what_the_data_types_do_not_have_is_not_tried() -> None:
 
 
 @pytest.mark.parametrize("service", [*UpfTrigger(DEFINITIONS).services])
-def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
+def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service):
     run = Run(Risk.FIRES, TRIGGER)
     del run.trigger.services[service]
     whole(run)
@@ -712,9 +699,7 @@ def test_a_trigger_that_answers_one_service_never_is_tried_to_the_end(service: s
     states=st.lists(st.integers(0, 7), min_size=1),
     launched=st.lists(st.booleans(), min_size=1),
 )
-def test_a_trigger_with_any_states_is_tried_to_the_end(
-    states: list[int], launched: list[bool]
-) -> None:
+def test_a_trigger_with_any_states_is_tried_to_the_end(states, launched):
     run = Run(Risk.FIRES, TRIGGER, BROADCAST)
     interval, right = run.trigger.broadcasts[names.TRIGGER_STATUS]
     told = partial(_changed, right, "state", cycle(states))
@@ -725,7 +710,7 @@ def test_a_trigger_with_any_states_is_tried_to_the_end(
 
 
 @pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
-def test_no_launch_leaves_the_bench_unasked(risk: Risk) -> None:
+def test_no_launch_leaves_the_bench_unasked(risk):
     bench = UpfBench(DEFINITIONS, risk, device=A_TRIGGER)
     bench.at(1.0)
     with pytest.raises(NotAllowedError):
@@ -735,7 +720,7 @@ def test_no_launch_leaves_the_bench_unasked(risk: Risk) -> None:
     assert bench.take_output() == []
 
 
-def test_a_bench_that_tries_a_controller_tells_no_trigger_anything() -> None:
+def test_a_bench_that_tries_a_controller_tells_no_trigger_anything():
     bench = UpfBench(DEFINITIONS, Risk.FIRES)
     bench.at(1.0)
     with pytest.raises(NotAllowedError):
