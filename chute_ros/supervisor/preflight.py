@@ -222,7 +222,7 @@ def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) ->
         said = datetime.date.fromordinal(_EPOCH + day).isoformat()
         reasons.append(f"the wall clock shows {said} (need 2024-01-01 or later)")
     for link in config.links:
-        reasons += _clock(config, link, state.evidence(link).clock_difference)
+        reasons += _clock(config, link, state.evidence(link))
     for link in config.deploy_links:
         for status in state.evidence(link).devices.values():
             if status.link_state is LinkState.OK:
@@ -235,8 +235,10 @@ def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) ->
     return tuple(reasons)
 
 
-def _clock(config: SupervisorConfig, link: str, difference: float) -> list[str]:
-    limit = config.preflight.max_clock_difference
+def _clock(config: SupervisorConfig, link: str, evidence: LinkEvidence) -> list[str]:
+    limit, difference = config.preflight.max_clock_difference, evidence.clocks_differ_by
+    if math.isnan(difference):
+        difference = evidence.clock_difference
     if abs(difference) > limit:
         return [f"{link}: its clock differs by {difference:+.3f} s (limit {limit:g} s)"]
     return []

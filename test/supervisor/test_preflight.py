@@ -223,6 +223,22 @@ def test_a_clock_that_differs_is_said_with_its_limit(difference):
     assert reasons(story) == ()
 
 
+def test_one_late_heartbeat_is_no_clock_that_differs():
+    """Given 3 s of heartbeats in time; at t+3.1 s one that took 0.4 s, at t+3.2 s one in time."""
+    story = standing()
+
+    def told_after(k: int, late: float) -> list[str]:
+        beat = i.LinkHeartbeat(LINK, LinkState.OK, True, 9 + k, clock_difference=late)
+        story.at(0.1 * k, beat)
+        return [one for one in reasons(story) if "clock" in one]
+
+    for k in range(33):
+        assert told_after(k, 0.4 if k == 31 else 0.01) == []
+    # A clock that is set shows in all that comes.
+    told = [told_after(k, 0.4) for k in range(33, 60)]
+    assert told[-1] == [f"{LINK}: its clock differs by +0.400 s (limit 0.25 s)"]
+
+
 def test_a_vehicle_that_moves_is_not_armed():
     story = standing(vertical_speed=-3.0, vertical_speed_age=0.0)
     (told,) = reasons(story)
