@@ -16,6 +16,7 @@ from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
     FALL_SIGNS,
+    FORCE_ERROR,
     HEIGHT,
     TILT,
     VERTICAL_SPEED,
@@ -53,6 +54,9 @@ _OFF_GROUND, _STANDS_BELOW = 2.5, 1.0
 _CALM_SPEED, _CALM_TILT = 8.0, 60.0
 #: What stands sinks no faster by two origins, m/s: lifts and slopes do not.
 _SINKS_FOR_SURE = 4.0
+#: Gusts, doors and motors move the barometer of what stands by no more, m/s; and what stands feels
+#: its weight, but for less than this, m/s^2, on the average of a second.
+_FALLS_BY_PRESSURE, _UNREST = 5.0, 2.0
 #: What ends a flight, after which a person may reset one that has been still for so long, s.
 _ENDED, STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
 #: Nothing that is not held flies steadily for so long, s.
@@ -145,6 +149,11 @@ def moving(config: SupervisorConfig, state: State, now: float) -> str:
     force = measured(config, state, ACCELERATION, now)
     if force < FREE_FALL and ACCELERATION not in state.heard.denied:
         return f"acceleration {force:.1f} m/s^2 (nothing on the ground below {FREE_FALL:g})"
+    # Of an estimator that hovers on nothing is denied: barometer and accelerometer are two more.
+    unrest = measured(config, state, FORCE_ERROR, now)
+    if rate < -_FALLS_BY_PRESSURE and unrest > _UNREST:
+        beside = f"force_error {unrest:.1f} m/s^2 (nothing that stands above {_UNREST:g})"
+        return f"climb_rate {rate:.1f} m/s (nothing below -{_FALLS_BY_PRESSURE:g}) and {beside}"
     return ""
 
 

@@ -374,8 +374,13 @@ def test_an_estimator_that_leans_over_in_a_descent_by_hand_ends_no_flight(profil
     assert teller.story.fired() == []
 
 
-def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer():
-    """Given a tumble whose height and speed are told as in a hover, with noise."""
+@pytest.mark.parametrize("says", [{}, DOWN], ids=["flying", "disarmed"])
+@pytest.mark.parametrize("noise", [6.0, 0.2])
+@pytest.mark.parametrize("carried", [False, True])
+def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer(says, noise, carried):
+    """Given a tumble whose height and speed are told as in a hover, with noise, also by one that
+    started anew, and says that it stands with its motors off. carried: by its drag, from the first
+    second on."""
     teller = hovering("multirotor", 100.0, 4.0)
     start = teller.story.t
     for k in range(40):
@@ -383,9 +388,10 @@ def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer():
         drop = 20.0**2 / 9.81 * math.log(math.cosh(9.81 * t / 20.0))
         teller.tell(
             height=100.0,
-            vertical_speed=teller.noise(6.0),
+            vertical_speed=teller.noise(noise),
             tilt=min(160.0, 230.0 * t),
-            force=6.0 + 4.0 * math.sin(9.0 * t),
+            force=12.0 if carried and t > 1.0 else 6.0 + 4.0 * math.sin(9.0 * t),
+            **says,
             true_height=100.0 - drop,
         )
     assert teller.story.fired()[:2] == ["KILL", "DEPLOY"]
