@@ -480,6 +480,29 @@ def test_a_drogue_of_ours_that_does_not_carry_is_followed_by_the_main(flagged):
     assert "canopy does not carry" in {one.rule for one in story.decisions(D)}
 
 
+@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+@pytest.mark.parametrize(("sinks", "again"), [(30.0, True), (6.0, False)])
+def test_an_order_that_nobody_confirms_is_given_again_while_it_falls_on(profile, sinks, again):
+    """Given a deploy that was sent, and nothing more: its board hung, or its canopy carries."""
+    story, height, speed = Story(shipped(profile)).ready().fly(1.0, height=900.0), 900.0, 0.0
+
+    def goes_on(seconds, towards):
+        nonlocal height, speed
+        for _ in range(round(seconds / 0.1)):
+            speed += min(max(towards - speed, -1.0), 1.0)
+            height += 0.1 * speed
+            story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed)
+
+    goes_on(4.0, -30.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    story.at(story.t + 0.01, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(story.t + 0.01, story.report(Action.DEPLOY, Outcome.SENT))
+    goes_on(story.config.deploy_timeout, -sinks)
+    assert story.state.stage is Stage.FAULT
+    goes_on(4.0, -sinks)
+    assert ("canopy does not carry" in {one.rule for one in story.decisions(D)}) is again
+
+
 @pytest.mark.parametrize("anew", [{}, {**REBOOTED, "height_holds": True}])
 @pytest.mark.parametrize(("sinks", "fires"), [(22.0, True), (12.5, True), (8.0, False)])
 def test_a_main_that_is_overdue_is_ordered(sinks, fires, anew):
