@@ -58,7 +58,7 @@ def check_links(turn: Turn) -> None:
         if not reasons:
             # What was armed before a link was silent is armed still, until its status says
             # otherwise: the heartbeat that makes the link whole may overtake it.
-            last_said = turn.state.armed(turn.config) + turn.state.armed(turn.config, False)
+            last_said = turn.state.last_armed(turn.config)
             heard = [one for one in last_said if turn.state.hears(turn.config, one[0], turn.now)]
             mute = [link for link in turn.config.deploy_links if turn.state.unmonitored(link)]
             if not heard and mute and turn.flight.armed_on_ground:

@@ -150,8 +150,8 @@ def moving(config: SupervisorConfig, state: State, now: float) -> str:
     if force < FREE_FALL and ACCELERATION not in state.heard.denied:
         return f"acceleration {force:.1f} m/s^2 (nothing on the ground below {FREE_FALL:g})"
     # Of an estimator that hovers on nothing is denied: barometer and accelerometer are two more.
-    unrest = measured(config, state, FORCE_ERROR, now)
-    if rate < -_FALLS_BY_PRESSURE and unrest > _UNREST:
+    falls = rate < -_FALLS_BY_PRESSURE
+    if falls and (unrest := measured(config, state, FORCE_ERROR, now)) > _UNREST:
         beside = f"force_error {unrest:.1f} m/s^2 (nothing that stands above {_UNREST:g})"
         return f"climb_rate {rate:.1f} m/s (nothing below -{_FALLS_BY_PRESSURE:g}) and {beside}"
     return ""

@@ -238,6 +238,7 @@ def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) ->
 def _clock(config: SupervisorConfig, link: str, evidence: LinkEvidence) -> list[str]:
     limit, difference = config.preflight.max_clock_difference, evidence.clocks_differ_by
     if math.isnan(difference):
+        # Within its first seconds the newest one is all that is known.
         difference = evidence.clock_difference
     if abs(difference) > limit:
         return [f"{link}: its clock differs by {difference:+.3f} s (limit {limit:g} s)"]

@@ -255,15 +255,19 @@ class State:
             for device in self.evidence(link).deployed
         )
 
-    def armed(self, config: SupervisorConfig, received: bool = True) -> list[tuple[str, str]]:
-        """(link, device) of every parachute that is received and says that it is armed; not
-        received: that said so last, and is silent."""
+    def last_armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
+        """(link, device) of every parachute that said last that it is armed."""
         return [
             (link, device)
             for link in config.deploy_links
             for device, status in sorted(self.evidence(link).devices.items())
-            if status.armed and (status.link_state is LinkState.OK) is received
+            if status.armed
         ]
+
+    def armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
+        """Those of them that are received."""
+        said = [(one, self.evidence(one[0]).devices[one[1]]) for one in self.last_armed(config)]
+        return [one for one, status in said if status.link_state is LinkState.OK]
 
     def newly_released(self, config: SupervisorConfig, now: float) -> frozenset[tuple[str, str]]:
         """Those that were not before the flight, on links that are heard."""

@@ -81,9 +81,9 @@ def _armed(
     """(link, device) of those that say that they are armed, and of those that said so last and are
     silent; one that is out is neither."""
     out = state.released(config)
-    said = [*state.armed(config), *state.armed(config, received=False)]
-    armed = [one for one in said if one not in out and _received(config, state, one, now)]
-    return armed, [one for one in said if one not in out and one not in armed]
+    said = [one for one in state.last_armed(config) if one not in out]
+    armed = [one for one in said if _received(config, state, one, now)]
+    return armed, [one for one in said if one not in armed]
 
 
 def _received(config: SupervisorConfig, state: State, one: tuple[str, str], now: float) -> bool:
