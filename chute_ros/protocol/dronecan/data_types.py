@@ -1,8 +1,8 @@
 """DSDL data types in use: looked up by name or id, turned to payloads and back.
 
-Values are plain: a structure is a dict of its fields, a union a dict of its one field, an array of
-uint8 bytes, another array a list. Source: DroneCAN specification, "Data structure description
-language"; the parser and the bit layout are those of pydronecan.
+Values are plain: a structure maps its fields, a union its one field, an array of uint8 is bytes,
+another one a sequence; nobody can change what was read. Source: DroneCAN specification, "Data
+structure description language"; the parser and the bit layout are those of pydronecan.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import math
 import struct
 from binascii import crc_hqx
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 from dronecan.dsdl import parser
@@ -26,6 +28,8 @@ from dronecan.transport import (
 from chute_ros.errors import MessageError, ParameterError
 
 Values = Mapping[str, Any]
+#: Payloads of a type that are remembered: devices say the same again and again.
+_REMEMBERED = 64
 _MISFITS = (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError)
 
 
@@ -52,6 +56,7 @@ class DataType:
         )
         self.constants: dict[str, Any] = {one.name: one.value for one in constants}
         self._named: dict[str, dict[Any, str]] = {}
+        self._decoded = lru_cache(maxsize=_REMEMBERED)(self._decode)
 
     def named(self, prefix: str) -> Mapping[Any, str]:
         """Value -> the first constant that has it, of those with this prefix."""
@@ -70,12 +75,15 @@ class DataType:
             raise MessageError(f"{self.name} cannot carry {dict(values)}: {error}") from None
         return bytes(bytes_from_bits(value._pack()))
 
-    def decode(self, payload: bytes) -> dict[str, Any] | None:
+    def decode(self, payload: bytes) -> Values | None:
         """The values in payload; None if it is too short or makes no sense. Never raises."""
+        return self._decoded(payload)
+
+    def _decode(self, payload: bytes) -> Values | None:
         value = CompoundValue(self._type, _mode=self._mode)
         try:
             value._unpack(bits_from_bytes(payload))
-            plain: dict[str, Any] = _plain(value)
+            plain: Values = _plain(value)
         except (*_MISFITS, struct.error):
             return None
         return plain
@@ -203,11 +211,12 @@ def _plain(value: Any) -> Any:
     if isinstance(value, CompoundValue):
         fields = value._fields
         names = [value._union_field] if value._is_union else list(fields)
-        return {name: _plain(fields[name]) for name in names if not name.startswith("_void_")}
+        told = {name: _plain(fields[name]) for name in names if not name.startswith("_void_")}
+        return MappingProxyType(told)
     if isinstance(value, ArrayValue):
         if len(value) > value._type.max_size:
             raise ValueError("more items than the type has")
         if _is_bytes(value._type):
             return value.to_bytes()
-        return [_plain(one) if isinstance(one, BaseValue) else one for one in value]
+        return tuple([_plain(one) if isinstance(one, BaseValue) else one for one in value])
     return value.value

@@ -26,7 +26,7 @@ class ReceivedTransfer:
     name: str
     source: int
     transfer_id: int
-    values: dict[str, Any]
+    values: Mapping[str, Any]
 
 
 class Endpoint:

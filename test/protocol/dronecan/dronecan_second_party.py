@@ -260,6 +260,10 @@ def our_frames_to_the_librarys_allocator():
     return given
 
 
+def _plain(one):
+    return one.hex() if isinstance(one, bytes) else dict(one)
+
+
 if __name__ == "__main__":
     # Its node monitor takes our GetNodeInfo request for a response, raises, and logs that.
     logging.disable(logging.CRITICAL)
@@ -272,4 +276,4 @@ if __name__ == "__main__":
         "two allocators": id_from_our_allocator(other_allocator=True),
         "their allocator": our_frames_to_the_librarys_allocator(),
     }
-    json.dump(stories, sys.stdout, default=lambda one: one.hex())
+    json.dump(stories, sys.stdout, default=_plain)

@@ -225,7 +225,7 @@ VECTORS = [
         "statistics: uavcan.protocol.GetTransportStats response",
         (33, 10, 0, 16),
         "10040aa1#7c59010000000080 0002000000000020 03000000000040",
-        {"transfers_tx": 1, "transfers_rx": 2, "transfer_errors": 3, "can_iface_stats": []},
+        {"transfers_tx": 1, "transfers_rx": 2, "transfer_errors": 3, "can_iface_stats": ()},
     ),
     Vector(
         "statistics_of_two_buses: uavcan.protocol.GetTransportStats response",
@@ -236,10 +236,10 @@ VECTORS = [
             "transfers_tx": 1,
             "transfers_rx": 2,
             "transfer_errors": 3,
-            "can_iface_stats": [
+            "can_iface_stats": (
                 {"frames_tx": 1, "frames_rx": 2, "errors": 3},
                 {"frames_tx": 4, "frames_rx": 5, "errors": 281474976710655},
-            ],
+            ),
         },
     ),
 ]

@@ -95,7 +95,7 @@ def test_it_tells_what_it_sent_and_received():
         "transfers_tx": 3,
         "transfers_rx": 1,
         "transfer_errors": 1,
-        "can_iface_stats": [],
+        "can_iface_stats": (),
     }
 
 

@@ -97,6 +97,16 @@ def test_what_is_not_given_is_zero_and_too_short_is_nothing():
             assert cut is None or data_type.encode(cut) == payload[:length], name
 
 
+def test_what_was_read_belongs_to_all_who_read_the_same_bytes_and_is_changed_by_none():
+    data_type = types().response(GET_SET)
+    payload = data_type.encode({"name": b"node_id", "value": {"integer_value": 7}})
+    read = data_type.decode(payload)
+    for values, name in ((read, "name"), (read["value"], "integer_value")):
+        with pytest.raises(TypeError):
+            values[name] = 8
+    assert data_type.decode(payload)["value"] == {"integer_value": 7}
+
+
 STATUS = "flyfire.ParachuteStatus"
 FLOAT16 = r"-65504\.0 to 65504"
 STATISTICS = "uavcan.protocol.GetTransportStats response"
@@ -279,7 +289,7 @@ def _parsed(folder, **files):
 def test_arrays_of_any_kind(tmp_path):
     text = "int8[<=2] small\nuint12[3] fixed\nbool[2] flags\nfloat16[<=2] f\n"
     kind = DataTypes(_parsed(tmp_path, **{"20000_Odd": text})).message("flyfire.Odd")
-    values = {"small": [-128, 127], "fixed": [0, 4095, 1], "flags": [True, False], "f": [0.5]}
+    values = {"small": (-128, 127), "fixed": (0, 4095, 1), "flags": (True, False), "f": (0.5,)}
     assert kind.decode(kind.encode(values)) == values
     for name, one in (
         ("small", [128]),
