@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -60,6 +61,15 @@ class ReleaseStep:
     detail: str = ""
 
 
+class Fate(enum.Enum):
+    """What became of an order to release."""
+
+    RELEASED = "Released"
+    UNCONFIRMED = "Ordered, without a report that it was released by this"
+    REFUSED = "Ordered, and refused or failed"
+    NOT_SENT = "Decided, and not sent"
+
+
 @dataclass
 class Release:
     """An order to release, or a parachute that was released without one. at: s from the start;
@@ -72,6 +82,7 @@ class Release:
     motion: MotionThen = MotionThen()
     steps: list[ReleaseStep] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    fate: Fate = Fate.UNCONFIRMED
 
 
 @dataclass(frozen=True)
@@ -95,6 +106,8 @@ class ReleaseOrder:
     until: float
     is_sent: bool = True
     is_refused: bool = False
+    #: Its node reports that it was carried out.
+    is_confirmed: bool = False
     effects: list[TurnedDeployed] = field(default_factory=list)
 
     def is_for(self, device: str) -> bool:
@@ -143,8 +156,9 @@ def _decision(one: Decided, link: str, end: float) -> ReleaseOrder:
         release.missing.append(f"{', '.join(lacking)} {rest}")
     until = one.at + max((after for after, _ in reports), default=0.0)
     is_sent = bool(decision.targets) and not decision.shadow
-    is_refused = Outcome.FAILED in reached and Outcome.CONFIRMED not in reached
-    return ReleaseOrder(link, decision.device, release, until, is_sent, is_refused)
+    confirmed = Outcome.CONFIRMED in reached
+    refused = not confirmed and bool(reached & {Outcome.FAILED, Outcome.REFUSED})
+    return ReleaseOrder(link, decision.device, release, until, is_sent, refused, confirmed)
 
 
 def _report(after: float, report: i.ActionReport) -> ReleaseStep:
@@ -159,8 +173,9 @@ def called(story: FlightStory, end: float) -> Iterator[ReleaseOrder]:
             release = Release(call.at, call.link, order, (call.details,))
             until = call.at + _add_answer(release, call, call.link, end)
             finish = call.answer and call.answer[1]
-            is_refused = finish is not None and not (finish.success or finish.accepted)
-            yield ReleaseOrder(call.link, "", release, until, is_refused=is_refused)
+            refused = finish is not None and not (finish.success or finish.accepted)
+            confirmed = finish is not None and finish.success
+            yield ReleaseOrder(call.link, "", release, until, True, refused, confirmed)
 
 
 def in_vain(story: FlightStory, end: float) -> Iterator[Release]:
@@ -176,6 +191,8 @@ def in_vain(story: FlightStory, end: float) -> Iterator[Release]:
         release = Release(one.at, "none", order, (one.details,))
         _add_answer(release, one, "supervisor", end)
         release.missing.append("no decision to deploy followed")
+        if one.answer is not None:
+            release.fate = Fate.REFUSED
         yield release
 
 

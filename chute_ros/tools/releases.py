@@ -8,6 +8,7 @@ import bisect
 from chute_ros.model import LinkState, VehicleState
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.release_orders import (
+    Fate,
     MotionThen,
     Release,
     ReleaseOrder,
@@ -73,7 +74,9 @@ class _Own:
         named = ", ".join(reached) if len(reached) == 1 or order.effects else order.device
         release.parachute = f"{order.link} {named}".strip()
         if order.effects or not order.is_sent:
+            release.fate = Fate.RELEASED if order.effects else Fate.NOT_SENT
             return
+        release.fate = Fate.REFUSED if order.is_refused else Fate.UNCONFIRMED
         out = [device for device in devices if self._was_out(order.link, device, release.at)]
         for device in out:
             text = f"{device} reported it before the order"
@@ -84,6 +87,8 @@ class _Own:
             return
         after = any(self._told[order.link, device][-1][0] > release.at for device in devices)
         if not after:
+            if order.is_confirmed and not out:
+                release.fate = Fate.RELEASED  # by the word of its node, which nothing denies
             release.missing.append(
                 f"no status of a parachute of {order.link} in the {end - release.at:.1f} s to the "
                 "recording's end"
@@ -122,7 +127,8 @@ def _unordered(turned: TurnedDeployed, has_calls: bool) -> Release:
     order = "no order is in this recording"
     if has_calls:
         order += ": the device itself, by hand, or past the nodes"
-    release = Release(turned.at, f"{turned.link} {turned.status.device}", order)
+    who = f"{turned.link} {turned.status.device}"
+    release = Release(turned.at, who, order, fate=Fate.RELEASED)
     release.steps.append(_step(turned, 0.0))
     return release
 

@@ -22,6 +22,7 @@ body { margin: 0; background: var(--page); color: var(--text);
   font: 14px/1.45 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
 main { max-width: 1180px; margin: 0 auto; padding: 20px 16px 40px; }
 h1 { font-size: 22px; margin: 4px 0 2px; } h2 { font-size: 16px; margin: 0 0 10px; }
+h3 { font-size: 14px; margin: 14px 0 4px; }
 p { margin: 4px 0; } .dim { color: var(--dim); }
 section { background: var(--card); border: 1px solid var(--edge); border-radius: 8px;
   padding: 14px 16px; margin: 14px 0; }

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from chute_ros.model import ParachuteStatus
 from chute_ros.tools.flight_story import Asked, FlightStory
-from chute_ros.tools.release_orders import MotionThen, Release, trigger_of
+from chute_ros.tools.release_orders import Fate, MotionThen, Release, trigger_of
 from chute_ros.tools.report_parts import cell, listing, number, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -18,7 +18,7 @@ _NO_CALLS = "Requests to device nodes are not in this recording: it has no topic
 
 
 def release_of(released: Sequence[Release], story: FlightStory) -> str:
-    """Each release, or that there was none."""
+    """What was released and what was not, in short; then each with all that is known of it."""
     calls = "" if story.has_calls else f'<p><b class="warn">{_NO_CALLS}</b></p>'
     if not released:
         asked = ", no call of a device node that orders one" if story.has_calls else ""
@@ -26,6 +26,23 @@ def release_of(released: Sequence[Release], story: FlightStory) -> str:
             "<p>Nothing was released: no decision to deploy, no request to deploy"
             f"{asked}, and no parachute that turned to deployed.</p>{calls}"
         )
+    by_fate = {fate: [one for one in released if one.fate is fate] for fate in Fate}
+    told = "".join(
+        f"<p><b>{fate.value}:</b> {escaped(_in_short(those) or 'nothing')}</p>"
+        for fate, those in by_fate.items()
+        if those or fate is Fate.RELEASED
+    )
+    tables = "".join(
+        f"<h3>{fate.value}</h3>{_orders(those)}" for fate, those in by_fate.items() if those
+    )
+    return told + calls + tables
+
+
+def _in_short(those: Sequence[Release]) -> str:
+    return ", ".join(f"{one.parachute} ({one.at:.3f} s)" for one in those)
+
+
+def _orders(those: Sequence[Release]) -> str:
     heads = (
         "time, s",
         "parachute",
@@ -33,7 +50,7 @@ def release_of(released: Sequence[Release], story: FlightStory) -> str:
         "height, vertical speed",
         "what was reported",
     )
-    return calls + table(
+    return table(
         (*heads, "what did not come"),
         (
             (
@@ -44,7 +61,7 @@ def release_of(released: Sequence[Release], story: FlightStory) -> str:
                 words(_steps(one)),
                 words(_missing(one)),
             )
-            for one in released
+            for one in those
         ),
     )
 

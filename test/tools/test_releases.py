@@ -5,7 +5,7 @@ import pytest
 from chute_ros.model import Action, Decision, LinkState, Outcome, ParachuteStatus, VehicleState
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.flight_story import Asked, Decided, FlightStory
-from chute_ros.tools.release_orders import MotionThen
+from chute_ros.tools.release_orders import Fate, MotionThen
 from chute_ros.tools.releases import releases
 
 LINK, END = "mavlink_parachute", 30.0
@@ -316,3 +316,49 @@ def test_releases_are_in_the_order_of_time():
 def test_a_height_that_nobody_reported_is_not_known():
     (one,) = Story().vehicle(11.0, 40.0, 0.0).decision(10.0).told()
     assert one.motion.height != one.motion.height
+
+
+REFUSED = {"success": False, "accepted": False, "message": "no"}
+OUT = {"success": True, "accepted": True, "message": "deployed"}
+
+
+@pytest.mark.parametrize(
+    ("story", "fates"),
+    [
+        # Its own status says so, whoever ordered it, or nobody.
+        (Story().status(9.0, False).decision(10.0).status(10.5, True), [Fate.RELEASED]),
+        (Story().status(9.0, False).status(10.5, True), [Fate.RELEASED]),
+        # Its node says so, and nothing of its own status is recorded; or that denies it.
+        (Story().decision(10.0).report(0.3, Outcome.CONFIRMED), [Fate.RELEASED]),
+        (Story().call(10.0, after=0.3, **OUT), [Fate.RELEASED]),
+        (
+            Story().decision(10.0).report(0.3, Outcome.CONFIRMED).status(11.0, False),
+            [Fate.UNCONFIRMED],
+        ),
+        # It is not said twice that one parachute was released.
+        (
+            Story().status(8.0, False).status(9.0, True).call(10.0, after=0.3, **OUT),
+            [Fate.RELEASED, Fate.UNCONFIRMED],
+        ),
+        (Story().decision(10.0).report(0.1, Outcome.ACCEPTED), [Fate.UNCONFIRMED]),
+        (Story().decision(10.0).report(0.1, Outcome.FAILED), [Fate.REFUSED]),
+        (Story().decision(10.0).report(0.1, Outcome.REFUSED), [Fate.REFUSED]),
+        (Story().call(10.0, after=0.1, **REFUSED), [Fate.REFUSED]),
+        (Story().call(10.0), [Fate.UNCONFIRMED]),
+        (Story().decision(10.0, shadow=True), [Fate.NOT_SENT]),
+        (Story().decision(10.0, targets=()), [Fate.NOT_SENT]),
+    ],
+)
+def test_what_was_released_is_told_apart_from_what_was_only_ordered(story, fates):
+    assert [one.fate for one in story.told()] == fates
+
+
+@pytest.mark.parametrize(
+    ("answer", "fate"),
+    [((0.1, i.Finish(1, False, False, "refused")), Fate.REFUSED), (None, Fate.UNCONFIRMED)],
+)
+def test_a_request_that_led_to_no_decision_released_nothing(answer, fate):
+    story = Story()
+    story.story.requests.append(Asked(5.0, "deploy", "force: False", answer))
+    (one,) = story.told()
+    assert one.fate is fate

@@ -19,7 +19,7 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report_command as report
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.recording import read
-from chute_ros.tools.release_orders import MotionThen, Release
+from chute_ros.tools.release_orders import Fate, MotionThen, Release
 from chute_ros.tools.report_command import replayed_states
 from chute_ros.tools.report_release import release_of
 from chute_ros.tools.state_rows import rules_of, state_rows
@@ -90,7 +90,7 @@ def test_it_needs_nothing_from_elsewhere_and_runs_nothing(page):
 
 def text_of(part):
     """Its words, a line for each cell of a table."""
-    cells = re.sub(r"</t[dh]>|</p>", "\n", re.sub(r"<br>|<li>", " / ", part))
+    cells = re.sub(r"</t[dh]>|</p>|</h3>", "\n", re.sub(r"<br>|<li>", " / ", part))
     lines = html.unescape(re.sub(r"<[^>]+>", "", cells)).splitlines()
     return [line.strip() for line in lines if line.strip()]
 
@@ -100,6 +100,8 @@ def test_the_first_section_tells_the_release_that_a_person_asked_the_supervisor_
     assert page.index("<h2>") == page.index("<h2>Release</h2>")
     assert text_of(section(page, "Release")) == [
         "Release",
+        "Released: mavlink_parachute (7.300 s)",
+        "Released",
         *("time, s", "parachute", "by whose order", "height, vertical speed"),
         *("what was reported", "what did not come"),
         "7.300",
@@ -116,6 +118,9 @@ def test_the_first_section_tells_the_release_that_a_person_asked_the_supervisor_
         ),
         "no status of a parachute of mavlink_parachute in the 4.6 s to the recording's end",
     ]
+
+
+UNCONFIRMED = "Ordered, without a report that it was released by this"
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +149,13 @@ def shot(tmp_path_factory):
 
 def test_a_shot_that_a_person_fired_past_the_supervisor_is_told(shot):
     order = "a call of ~/deploy of mavlink_parachute, past the supervisor / "
-    assert text_of(section(shot, "Release"))[7:] == [
+    told = text_of(section(shot, "Release"))
+    assert told[1:4] == [
+        "Released: mavlink_parachute 1/161 (1.000 s)",
+        f"{UNCONFIRMED}: mavlink_parachute 1/161 (1.800 s)",
+        "Released",
+    ]
+    assert told[10:16] == [
         "1.000",
         "mavlink_parachute 1/161",
         order + "force=False, reason='a <test>'",
@@ -155,6 +166,9 @@ def test_a_shot_that_a_person_fired_past_the_supervisor_is_told(shot):
             "mavlink_parachute answered: success, accepted after 0.350 s: deployed after 0.3 s"
         ),
         "nothing",
+    ]
+    assert told[16] == UNCONFIRMED
+    assert told[23:] == [
         "1.800",
         "mavlink_parachute 1/161",
         order + "force=True, reason=''",
@@ -241,6 +255,21 @@ def test_an_old_recording_is_read_and_says_that_it_lacks_the_calls(tmp_path, mon
 def test_a_height_that_is_old_or_missing_is_not_known(age, told):
     one = Release(1.0, "upf_can 33", "rule 'free fall'", motion=MotionThen(32.1, age, -4.0, age))
     assert text_of(release_of([one], FlightStory()))[-3] == told
+
+
+def test_what_was_refused_stands_apart_from_what_was_released():
+    refused = Release(1.0, "none", "a person's request at safety/deploy", fate=Fate.REFUSED)
+    shadow = Release(2.0, "upf_can", "rule 'free fall'", fate=Fate.NOT_SENT)
+    told = text_of(release_of([refused, shadow], FlightStory()))
+    assert told[:3] == [
+        "Released: nothing",
+        "Ordered, and refused or failed: none (1.000 s)",
+        "Decided, and not sent: upf_can (2.000 s)",
+    ]
+    released = Release(3.0, "upf_can 33", "rule 'free fall'", fate=Fate.RELEASED)
+    told = text_of(release_of([refused, shadow, released], FlightStory()))
+    assert told[0] == "Released: upf_can 33 (3.000 s)"
+    assert told.index("upf_can 33") < told.index("none"), "what was released has the first table"
 
 
 def test_each_decision_has_its_reasons_and_what_came_of_it(page, flight):
