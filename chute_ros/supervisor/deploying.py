@@ -83,7 +83,22 @@ def check_kill(turn: Turn) -> None:
             why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
             told = f"{why} ({_limit(turn, kill)})"
         turn.move(StageEvent.DEPLOY_DUE, why)
-        _fire(turn, told)
+        launches = _own_launch_first(turn)
+        _fire(turn, f"{told}; {launches}" if launches else told)
+
+
+def _own_launch_first(turn: Turn) -> str:
+    """A device asks for the kill before it launches by itself: its step is the first, so that no
+    other canopy comes out beside its own. Returns that in words; empty: it is as configured."""
+    asking = {who: ask.link for who, ask in turn.state.asks.items() if turn.now < ask.ends_at}
+    named = [rung for rung in turn.ladder if f"{rung.link} {rung.device}" in asking]
+    chosen = [rung for rung in turn.ladder if not rung.device and rung.link in asking.values()]
+    launch = named or chosen
+    ladder = (*launch, *(rung for rung in turn.ladder if rung not in launch))
+    if ladder == turn.ladder:
+        return ""
+    turn.deploying = replace(turn.deploying, deploy_ladder=ladder)
+    return f"{', '.join(asking)} asks for the kill to launch by itself: its step is the first"
 
 
 def _kill_again(turn: Turn, kill: Pending) -> None:

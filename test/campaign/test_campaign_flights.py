@@ -106,6 +106,13 @@ def test_a_upf_that_may_releases_itself_when_the_power_fails() -> None:
     assert end.truth.at < end.released < end.truth.latest
 
 
+@pytest.mark.parametrize("failure", [Failure.MOTOR, Failure.REBOOT, Failure.SINK])
+def test_beside_a_upf_that_releases_itself_no_other_parachute_comes_out(failure: Failure) -> None:
+    one = correct(flown(failure, vehicle="both", aps=True))
+    assert any(act.rule == "device asks for a kill" for _, act in one.decided)
+    assert math.isnan(one.released_another)
+
+
 def test_a_cable_that_is_cut_for_the_whole_fall_is_named() -> None:
     cut = WayFault("autopilot", Spell(0.9, 20.0, loss=1.0))
     judged = judge(flown(Failure.MOTOR, cut))

@@ -2,6 +2,7 @@
 no silence at its end, and the answer in its words."""
 
 import itertools
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -328,6 +329,54 @@ def test_the_whole_ladder_is_climbed_step_by_step_to_the_triggers_themselves():
     assert story.newest(D).targets == (UPF,)
     times = [t for t, _, again in story.sent(D) if not again]
     assert times == pytest.approx([1.0, 3.0, 5.0, 7.0])
+
+
+LAUNCHES = i.KillRequest(0, f"{UPF} 33", "it is about to launch (TYPE_KILLSWITCH)")
+
+
+def launching(deploy_at: float, ask_at: float = 1.0, by: str = f"{UPF} 33") -> Story:
+    """A device asks for the kill at ask_at, and a person for a deploy at deploy_at; the kill is
+    confirmed at 1.3."""
+    story = Story(SupervisorConfig(deploy_links=BOTH, deploy_ladder=LADDER)).flying()
+    story.alive(0.9, *BOTH)
+    deploy = i.DeployRequest(5, False, "it falls")
+    asked = [(ask_at, replace(LAUNCHES, by=by)), (deploy_at, deploy)]
+    for t, request in sorted(asked, key=lambda one: one[0]):
+        story.alive(t - 0.04, *BOTH)
+        story.at(t, request)
+    story.alive(1.26, *BOTH)
+    story.at(max(1.3, story.t), story.report(K, Outcome.CONFIRMED))
+    return story
+
+
+@pytest.mark.parametrize("deploy_at", [0.95, 1.1, 1.9])
+def test_beside_a_parachute_that_launches_itself_no_other_is_released(deploy_at):
+    """Its step is the first, also where the deploy was wanted before it asked for the kill."""
+    story = launching(deploy_at)
+    assert steps(story) == [(UPF, "")]
+    told = "upf_can 33 asks for the kill to launch by itself: its step is the first"
+    assert told in story.newest(D).reasons[-1]
+    story.at(story.t + 0.1, parachute(UPF, "33", deployed=True))
+    story.alive(12.0, *BOTH)
+    assert story.state.stage is Stage.DEPLOYED
+    assert steps(story) == [(UPF, "")]
+
+
+def test_one_that_was_about_to_launch_and_does_not_come_out_is_followed_by_the_others():
+    story = launching(1.1)
+    story.alive(3.25, *BOTH)
+    assert steps(story) == [(UPF, "")]
+    story.alive(8.0, *BOTH)
+    assert steps(story) == [(UPF, ""), (LINK, ""), (LINK, "1/162"), (UPF, "trigger")]
+
+
+@pytest.mark.parametrize(("deploy_at", "by"), [(2.05, f"{UPF} 33"), (1.1, "umbilical 1")])
+def test_one_that_asked_long_ago_or_is_on_no_step_changes_none(deploy_at, by):
+    assert steps(launching(deploy_at, by=by)) == ALL[:1]
+
+
+def test_of_two_on_one_link_the_one_that_launches_itself_is_the_first():
+    assert steps(launching(1.1, by=f"{LINK} 1/162"))[0] == (LINK, "1/162")
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
