@@ -90,7 +90,7 @@ def check_kill(turn: Turn) -> None:
 def _own_launch_first(turn: Turn) -> str:
     """A device asks for the kill before it launches by itself: its step is the first, so that no
     other canopy comes out beside its own. Returns that in words; empty: it is as configured."""
-    asking = {who: ask.link for who, ask in turn.state.asks.items() if turn.now < ask.ends_at}
+    asking = {who: ask.link for who, ask in turn.state.asking(turn.now).items()}
     named = [rung for rung in turn.ladder if f"{rung.link} {rung.device}" in asking]
     chosen = [rung for rung in turn.ladder if not rung.device and rung.link in asking.values()]
     launch = named or chosen

@@ -65,7 +65,7 @@ def kill_request(turn: Turn, one: i.KillRequest) -> None:
 
 
 def _device_asks(turn: Turn, one: i.KillRequest) -> None:
-    asks = {who: ask for who, ask in turn.state.asks.items() if turn.now < ask.ends_at}
+    asks = turn.state.asking(turn.now)
     if one.by in asks or len(asks) < MOST_DEVICE_BLOCKS:
         asks[one.by] = Ask(turn.now, one.by.partition(" ")[0], one.reason)
     rules = dict(turn.state.rules)

@@ -211,8 +211,13 @@ class State:
         return self.deploying.deploys[-1] if self.deploying.deploys else None
 
     def ladder(self, config: SupervisorConfig) -> tuple[Rung, ...]:
-        """The steps of the deploy, without those whose parachutes were out when it was ordered."""
+        """The steps of the deploy, without those whose parachutes were out when it was ordered;
+        one that launches itself has the first."""
         return self.deploying.deploy_ladder or config.ladder
+
+    def asking(self, now: float) -> dict[str, Ask]:
+        """The devices that want a kill now, each with what it asked."""
+        return {who: ask for who, ask in self.asks.items() if now < ask.ends_at}
 
     def measured(self, name: str) -> Measured:
         """What is known of a measurement."""

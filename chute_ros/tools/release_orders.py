@@ -158,7 +158,15 @@ def _decision(one: Decided, link: str, end: float) -> ReleaseOrder:
     is_sent = bool(decision.targets) and not decision.shadow
     confirmed = Outcome.CONFIRMED in reached
     refused = not confirmed and bool(reached & {Outcome.FAILED, Outcome.REFUSED})
-    return ReleaseOrder(link, decision.device, release, until, is_sent, refused, confirmed)
+    return ReleaseOrder(
+        link,
+        decision.device,
+        release,
+        until,
+        is_sent=is_sent,
+        is_refused=refused,
+        is_confirmed=confirmed,
+    )
 
 
 def _report(after: float, report: i.ActionReport) -> ReleaseStep:
@@ -175,7 +183,9 @@ def called(story: FlightStory, end: float) -> Iterator[ReleaseOrder]:
             finish = call.answer and call.answer[1]
             refused = finish is not None and not (finish.success or finish.accepted)
             confirmed = finish is not None and finish.success
-            yield ReleaseOrder(call.link, "", release, until, True, refused, confirmed)
+            yield ReleaseOrder(
+                call.link, "", release, until, is_refused=refused, is_confirmed=confirmed
+            )
 
 
 def in_vain(story: FlightStory, end: float) -> Iterator[Release]:

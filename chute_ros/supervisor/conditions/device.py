@@ -57,8 +57,8 @@ class DeviceCondition(Condition):
             # One whose link is not among ours may ask all the same: to kill is the safe side.
             asks = [
                 f"{who}: {ask.reason}"
-                for who, ask in state.asks.items()
-                if now < ask.ends_at and (self.link == ANY or ask.link in names)
+                for who, ask in state.asking(now).items()
+                if self.link == ANY or ask.link in names
             ]
             return Finding(bool(asks), lambda: "; ".join(asks) or "no device asks for a kill")
         if self.fact is DeviceFact.DEPLOYED:
