@@ -75,7 +75,7 @@ class SupervisorHost:
         #: When it was first told that a parachute is out.
         self.knew_release = math.nan
         self._kept: State | None = None
-        self._released: frozenset[tuple[str, str]] = frozenset()
+        self._released = self._armed = frozenset[tuple[str, str]]()
         self._begin(_FIRST_EPOCH, None, 0.0)
         for kind in _HEARD:
             ros.subscribe(kind, process, self._take)
@@ -86,7 +86,7 @@ class SupervisorHost:
             ros.subscribe(LeaseClaim, process, self._claim)
 
     def _begin(self, epoch: int, before: State | None, now: float) -> None:
-        start = Start(epoch, f"{self.process.name} {now}", before, self._released)
+        start = Start(epoch, f"{self.process.name} {now}", before, self._released, self._armed)
         self.runtime = SupervisorRuntime(self.config, self._lease_config, self, start, now)
         self._hearing = VehicleHearing(
             self._vehicle_sources,
@@ -152,7 +152,8 @@ class SupervisorHost:
 
     def keep(self, state: State) -> None:
         """Until the next start."""
-        self._kept, self._released = state, state.released_since_reset
+        self._kept = state
+        self._released, self._armed = state.released_since_reset, state.last_armed
 
     def offer(self, offered: bool) -> None:
         """Who calls asks the one that leads."""

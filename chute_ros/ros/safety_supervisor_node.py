@@ -83,7 +83,8 @@ class SafetySupervisorNode(SuiteNode):
             max(0, int(time.time()) & 0xFFFFFFFF),
             secrets.token_hex(8),
             self._memory.recall(),
-            self._memory.released(),
+            self._memory.released.before,
+            self._memory.armed.before,
             inputs.Mode[self.values["mode"]],
         )
         self._recorder = FlightRecorder(self, self.values)

@@ -1,6 +1,7 @@
 """Keeps the supervisor's state in a file while a flight lasts, for one that starts again in it.
 
-In another file: what was released, until a person resets.
+In two others, whatever starts anew: what was released, until a person resets, and what said last
+that it is armed.
 """
 
 from __future__ import annotations
@@ -26,15 +27,50 @@ from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import (
     SavedState,
     dump,
-    dump_released,
+    dump_parachutes,
     load,
-    load_released,
+    load_parachutes,
     worth_saving,
 )
 from chute_ros.supervisor.state import State
 
 #: Changes with each start of the computer, with which the monotonic clock begins anew.
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+
+class RememberedParachutes:
+    """(link, device) of those of which what holds, kept in a file that outlives every start."""
+
+    def __init__(self, folder: str, own: str, node: Node) -> None:
+        self.what = f"was {folder}"
+        self._file = KeptFile(
+            ros_home() / folder / f"{own}.json", dump_parachutes, folder, durable=True
+        )
+        self.close = self._file.close
+        #: Before this start; where that cannot be read, there may be one.
+        self.before = frozenset[tuple[str, str]]()
+        path = self._file.path
+        try:
+            self.before = load_parachutes(read_own_text(path))
+        except (FileNotFoundError, NotADirectoryError):
+            pass  # nothing was ever kept there
+        except (OSError, ValueError, RecordError) as error:
+            node.get_logger().error(
+                f"cannot read what {self.what} before this start: {path}: {error}"
+            )
+            self.before = frozenset({("a parachute that is not known", f"({path} is damaged)")})
+        self._newest = self.before
+
+    @property
+    def trouble(self) -> str:
+        """Why the newest is not kept; empty: it is."""
+        return self._file.trouble
+
+    def keep(self, those: frozenset[tuple[str, str]]) -> None:
+        """The newest."""
+        if those != self._newest:
+            self._newest = those
+            self._file.keep(those)
 
 
 class SupervisorMemory:
@@ -57,23 +93,8 @@ class SupervisorMemory:
         self._settings = hashlib.sha256(told.encode()).hexdigest()
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
         self._file = KeptFile(self._path, self._text, "memory") if self._within else None
-        self._released_file = KeptFile(
-            ros_home() / "released" / f"{own}.json", dump_released, "released", durable=True
-        )
-        self._released = frozenset[tuple[str, str]]()
-
-    def released(self) -> frozenset[tuple[str, str]]:
-        """What was released since the last reset, before this start. Where that cannot be read,
-        something may have been."""
-        path = self._released_file.path
-        try:
-            self._released = load_released(read_own_text(path))
-        except (FileNotFoundError, NotADirectoryError):
-            pass  # nothing was ever kept there
-        except (OSError, ValueError, RecordError) as error:
-            self._log.error(f"cannot read what was released before this start: {path}: {error}")
-            self._released = frozenset({("a parachute that is not known", f"({path} is damaged)")})
-        return self._released
+        self.released = RememberedParachutes("released", own, node)
+        self.armed = RememberedParachutes("armed", own, node)
 
     def recall(self) -> State | None:
         """The saved state, read once: a state that ends this process does not end the next."""
@@ -96,9 +117,8 @@ class SupervisorMemory:
 
     def keep(self, state: State) -> None:
         """The newest state."""
-        if state.released_since_reset != self._released:
-            self._released = state.released_since_reset
-            self._released_file.keep(state)
+        self.released.keep(state.released_since_reset)
+        self.armed.keep(state.last_armed)
         if self._file is not None:
             self._file.keep(state)
 
@@ -110,9 +130,10 @@ class SupervisorMemory:
             if self._file.trouble:
                 level = diagnostics.WARN
                 text = f"a restart in flight would lose it: {self._file.trouble}"
-        if self._released_file.trouble:
-            level = diagnostics.WARN
-            text = f"a restart would forget what was released: {self._released_file.trouble}"
+        for those in (self.armed, self.released):
+            if those.trouble:
+                level = diagnostics.WARN
+                text = f"a restart would forget what {those.what}: {those.trouble}"
         written_times = 0 if self._file is None else self._file.times_written
         values = {"file": str(self._path), "times written": written_times}
         return diagnostics.status(name, "memory", level, text, values, "")
@@ -121,7 +142,8 @@ class SupervisorMemory:
         """Write what waits, then the name is free."""
         if self._file is not None:
             self._file.close()
-        self._released_file.close()
+        self.released.close()
+        self.armed.close()
         self._lock.close()
 
     def _text(self, state: State) -> str:

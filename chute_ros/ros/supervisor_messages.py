@@ -69,7 +69,7 @@ def summary_message(
         text=whole.state_text,
         mode=whole.mode,
         flight_blocked=whole.flight_blocked,
-        armed=[" ".join(one) for one in state.armed(config)],
+        armed=[" ".join(one) for one in state.armed()],
         released=[" ".join(one) for one in sorted(state.released_since_reset)],
         links_ok=sum(
             not link_problem(config, one, state.evidence(one), told.now) for one in config.links

@@ -54,13 +54,14 @@ class FinishedTurn:
 @dataclass(frozen=True)
 class Start:
     """epoch: rises from start to start; before: the state that the last one left, None: none that
-    is to be gone on with; released: what was released since the last reset, of whatever start;
-    instance: a text that no other supervisor has."""
+    is to be gone on with; released, armed: what was released since the last reset, and what said
+    last that it is armed, of whatever start; instance: a text that no other supervisor has."""
 
     epoch: int
     instance: str
     before: State | None = None
     released: frozenset[tuple[str, str]] = frozenset()
+    armed: frozenset[tuple[str, str]] = frozenset()
     mode: inputs.Mode = inputs.Mode.ACTIVE
 
 
@@ -105,7 +106,7 @@ class SupervisorRuntime:
                 above = epoch_above(max(epoch, start.before.epoch), lease.rank)
                 self._first = (inputs.TakeOver(above),)
         released = self.state.released_since_reset | start.released
-        self.state = replace(self.state, released_since_reset=released)
+        self.state = replace(self.state, released_since_reset=released, last_armed=start.armed)
         self.lease = LeaseKeeper(lease, start.instance, shell, self, now)
         self._arming = DeviceArming(shell, self._armed)
         self.afterwards = DeferredWork()

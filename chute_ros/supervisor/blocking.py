@@ -24,8 +24,8 @@ def check_armed(turn: Turn) -> None:
     if turn.now < state.stage_since + ARMED_SHOWS:
         return
     if state.stage is Stage.READY:
-        _show_armed(turn, state.armed(turn.config))
-    elif state.stage is Stage.ARMED and not state.armed(turn.config):
+        _show_armed(turn, state.armed())
+    elif state.stage is Stage.ARMED and not state.armed():
         told = [
             status
             for link in turn.config.deploy_links
@@ -58,8 +58,12 @@ def check_links(turn: Turn) -> None:
         if not reasons:
             # What was armed before a link was silent is armed still, until its status says
             # otherwise: the heartbeat that makes the link whole may overtake it.
-            last_said = turn.state.last_armed(turn.config)
-            heard = [one for one in last_said if turn.state.hears(turn.config, one[0], turn.now)]
+            heard = [
+                one
+                for one in sorted(turn.state.last_armed)
+                if one[1] in turn.state.evidence(one[0]).devices
+                and turn.state.hears(turn.config, one[0], turn.now)
+            ]
             mute = [link for link in turn.config.deploy_links if turn.state.unmonitored(link)]
             if not heard and mute and turn.flight.armed_on_ground:
                 turn.move(

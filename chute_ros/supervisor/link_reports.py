@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from types import MappingProxyType
 
-from chute_ros.model import Action, LinkState
+from chute_ros.model import Action, LinkState, ParachuteStatus
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.link_evidence import LinkEvidence
@@ -17,7 +17,7 @@ from chute_ros.supervisor.sending import pending_in, renew, slots
 from chute_ros.supervisor.turn import Turn
 
 #: Parachutes whose release is remembered: made-up names must not grow us.
-MOST_RELEASED = 64
+MOST_REMEMBERED = 64
 
 
 def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
@@ -80,6 +80,7 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
     # One that started anew has forgotten it, which takes nothing back.
     forgot = said is not None and status.uptime < said.uptime
     _set_evidence(turn, one.link, turn.state.evidence(one.link).with_status(status, turn.now))
+    _note_armed(turn, one.link, status)
     if status.deployed and not was_out:
         _note_release(turn, one.link, status.device)
     if alive and not status.deployed:
@@ -97,12 +98,23 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
                 _unlatch_deploys(turn)
 
 
+def _note_armed(turn: Turn, link: str, status: ParachuteStatus) -> None:
+    """One that is not received ends nothing: it is armed still, for all that is known."""
+    armed, this = turn.state.last_armed, (link, status.device)
+    if status.armed and link in turn.config.deploy_links and len(armed) < MOST_REMEMBERED:
+        armed |= {this}
+    elif not status.armed and status.link_state is LinkState.OK:
+        armed -= {this}
+    if armed != turn.state.last_armed:
+        turn.state = replace(turn.state, last_armed=armed)
+
+
 def _note_release(turn: Turn, link: str, device: str) -> None:
     """Whoever did it: nobody flies with it before a person has looked at it."""
     if link not in turn.config.deploy_links:
         return
     since_reset = turn.state.released_since_reset
-    if len(since_reset) < MOST_RELEASED:
+    if len(since_reset) < MOST_REMEMBERED:
         since_reset = since_reset | {(link, device)}
     turn.state = replace(turn.state, released_since_reset=since_reset)
     if not turn.flight.airborne and turn.state.stage in ON_GROUND:

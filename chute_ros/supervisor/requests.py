@@ -145,6 +145,7 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
             # A device that still wants it asks again; one that was exchanged cannot.
             device_blocks=MappingProxyType({}),
             released_since_reset=frozenset(),
+            last_armed=_armed_still(turn),
         )
         turn.killing = replace(turn.killing, kill=None, killed_in_flight=False, kill_only=False)
         turn.deploying = replace(turn.deploying, deploys=())
@@ -152,6 +153,13 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
         turn.alarming = replace(turn.alarming, alarms=(), alarm_at=math.nan, canopy_fails=False)
         note_released(turn)
         turn.finish(one.token, True, True, "back to the start")
+
+
+def _armed_still(turn: Turn) -> frozenset[tuple[str, str]]:
+    """Without those that were exchanged while they were armed, which cannot say otherwise."""
+    state, links = turn.state, turn.config.deploy_links
+    silent = {link for link in links if not state.hears(turn.config, link, turn.now)}
+    return frozenset(one for one in state.last_armed if one[0] in silent or state.receives(*one))
 
 
 def mode_request(turn: Turn, one: i.ModeRequest) -> None:

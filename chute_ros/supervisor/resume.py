@@ -34,13 +34,12 @@ def worth_saving(state: State) -> bool:
     return state.flight.airborne or state.stage not in ON_GROUND
 
 
-def dump_released(state: State) -> str:
-    """What was released since the last reset, as JSON text; empty: nothing was."""
-    released = sorted(state.released_since_reset)
-    return json.dumps(released) if released else ""
+def dump_parachutes(those: frozenset[tuple[str, str]]) -> str:
+    """(link, device) of each, as JSON text; empty: there is none."""
+    return json.dumps(sorted(those)) if those else ""
 
 
-def load_released(text: str) -> frozenset[tuple[str, str]]:
+def load_parachutes(text: str) -> frozenset[tuple[str, str]]:
     """What was written. RecordError: nothing that was."""
     try:
         told = json.loads(text)

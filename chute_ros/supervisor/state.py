@@ -190,6 +190,9 @@ class State:
     #: (link, device) that have reported released since the last reset, whoever released them. One
     #: that starts anew and has forgotten it stays until a person resets.
     released_since_reset: frozenset[tuple[str, str]] = frozenset()
+    #: (link, device) that said last that they are armed, however long ago: one that is received
+    #: and says otherwise ends it, or a reset.
+    last_armed: frozenset[tuple[str, str]] = frozenset()
     #: It was said that no more of them are remembered.
     block_refused: bool = False
     killing: Killing = field(default=Killing(), metadata=INLINE)
@@ -260,19 +263,14 @@ class State:
             for device in self.evidence(link).deployed
         )
 
-    def last_armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
-        """(link, device) of every parachute that said last that it is armed."""
-        return [
-            (link, device)
-            for link in config.deploy_links
-            for device, status in sorted(self.evidence(link).devices.items())
-            if status.armed
-        ]
+    def armed(self) -> list[tuple[str, str]]:
+        """(link, device) of every parachute that is received and armed."""
+        return [one for one in sorted(self.last_armed) if self.receives(*one)]
 
-    def armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
-        """Those of them that are received."""
-        said = [(one, self.evidence(one[0]).devices[one[1]]) for one in self.last_armed(config)]
-        return [one for one, status in said if status.link_state is LinkState.OK]
+    def receives(self, link: str, device: str) -> bool:
+        """The node of this link said last that it receives this device."""
+        status = self.evidence(link).devices.get(device)
+        return status is not None and status.link_state is LinkState.OK
 
     def newly_released(self, config: SupervisorConfig, now: float) -> frozenset[tuple[str, str]]:
         """Those that were not before the flight, on links that are heard."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from chute_ros.model import Action, Decision, LinkState
+from chute_ros.model import Action, Decision
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
@@ -59,7 +59,11 @@ def _arming_text(config: SupervisorConfig, state: State, now: float) -> str:
         return ""
     armed, silent = _armed(config, state, now)
     text = f"; ARMED all the same: {_listed(armed)} (safety/arm disarms)" if armed else ""
-    return text + (f"; ARMED when it was last received: {_listed(silent)}" if silent else "")
+    if silent:
+        text += f"; ARMED when it was last received: {_listed(silent)}"
+    if any(link not in config.links or state.hears(config, link, now) for link, _ in silent):
+        text += " (one that was exchanged since is forgotten by safety/reset)"
+    return text
 
 
 def _armed_in_part(config: SupervisorConfig, state: State, now: float) -> str:
@@ -81,16 +85,14 @@ def _armed(
     """(link, device) of those that say that they are armed, and of those that said so last and are
     silent; one that is out is neither."""
     out = state.released(config)
-    said = [one for one in state.last_armed(config) if one not in out]
+    said = [one for one in sorted(state.last_armed) if one not in out]
     armed = [one for one in said if _received(config, state, one, now)]
     return armed, [one for one in said if one not in armed]
 
 
 def _received(config: SupervisorConfig, state: State, one: tuple[str, str], now: float) -> bool:
     """Its node receives this (link, device), and is received itself."""
-    link, device = one
-    status = state.evidence(link).devices[device]
-    return status.link_state is LinkState.OK and state.hears(config, link, now)
+    return state.receives(*one) and state.hears(config, one[0], now)
 
 
 def _listed(those: list[tuple[str, str]]) -> str:

@@ -152,13 +152,14 @@ def test_where_nothing_can_be_written_diagnostics_say_so(bench, monkeypatch):
 RELEASED = "mavlink_parachute 1/161 was released: repack or replace it, then call safety/reset"
 
 
-def tells(pair, deployed, stage):
+def tells(pair, stage, deployed=False, armed=False):
     """Its parachute says so, until the supervisor is there."""
     client, topic = pair.bench.client, f"{pair.bench.namespace}/parachute/status"
     publisher = client.create_publisher(ParachuteStatus, topic, qos.STATUS)
     message = ParachuteStatus(
-        link="mavlink_parachute", device="1/161", link_state=int(LinkState.OK), deployed=deployed
+        link="mavlink_parachute", device="1/161", link_state=int(LinkState.OK)
     )
+    message.deployed, message.armed = deployed, armed
 
     def there():
         publisher.publish(stamped(client, message))
@@ -172,7 +173,7 @@ def tells(pair, deployed, stage):
 def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pair, damaged):
     pair.start("a", 0, **ALONE)
     pair.await_stage(SafetyState.READY)
-    tells(pair, True, SafetyState.BLOCKED)
+    tells(pair, SafetyState.BLOCKED, deployed=True)
     folder = pair.processes.ros_home / "chute_ros" / "released"
     path = pair.bench.until(lambda: list(folder.glob("*.json")), "it is kept")[0]
     pair.send_signal("a", signal.SIGSTOP)
@@ -181,7 +182,7 @@ def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pa
     # Given a module that started anew too, and a supervisor that was set otherwise
     kill_and_start_again(pair, deploy_timeout=19.0)
     pair.states.clear()
-    tells(pair, False, SafetyState.BLOCKED)
+    tells(pair, SafetyState.BLOCKED)
     # A heartbeat may be late, which is a reason of its own.
     alone = pair.bench.until(
         lambda: [one for one in pair.states if len(one.block_reasons) == 1], "nothing else blocks"
@@ -193,5 +194,34 @@ def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pa
     else:
         assert reason == RELEASED
     assert pair.bench.call(Trigger, "safety/reset").success
-    tells(pair, False, SafetyState.READY)
+    tells(pair, SafetyState.READY)
     pair.bench.until(lambda: not path.exists(), "it is forgotten")
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_one_that_was_armed_as_its_node_died_is_told_whatever_starts_anew(pair, damaged):
+    pair.start("a", 0, **ALONE)
+    pair.await_stage(SafetyState.READY)
+    tells(pair, SafetyState.ARMED, armed=True)
+    folder = pair.processes.ros_home / "chute_ros" / "armed"
+    path = pair.bench.until(lambda: list(folder.glob("*.json")), "it is kept")[0]
+    pair.link.beating = False
+    pair.await_stage(SafetyState.BLOCKED)
+    pair.send_signal("a", signal.SIGSTOP)
+    if damaged:
+        path.write_text("[[")
+    kill_and_start_again(pair, deploy_timeout=19.0)
+    pair.states.clear()
+    pair.await_stage(SafetyState.BLOCKED)
+    told = pair.states[-1].state_text
+    unknown = f"a parachute that is not known ({path} is damaged)"
+    which = unknown if damaged else "mavlink_parachute 1/161"
+    assert f"ARMED when it was last received: {which}" in told
+    # Of a node that is dead a reset learns nothing.
+    assert pair.bench.call(Trigger, "safety/reset").success
+    if damaged:
+        pair.bench.until(lambda: not path.exists(), "what nobody knows is forgotten")
+    else:
+        pair.link.beating = True
+        tells(pair, SafetyState.READY)
+        pair.bench.until(lambda: not path.exists(), "it says otherwise")

@@ -9,7 +9,10 @@ from story import LINK, STANDING, START, Story, parachute
 from chute_ros.model import LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_reports import MOST_REMEMBERED
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.state_text import state_text
 from chute_ros.supervisor.wakes import next_deadline
 
 UPF = "upf_can"
@@ -140,3 +143,42 @@ def test_while_its_status_is_old_it_says_nothing_of_it():
     story = Story().ready()
     keeps_saying(story, 5.0, says(True, alive=False))
     assert story.state.stage is Stage.READY
+
+
+def test_a_node_that_starts_anew_without_its_device_takes_nothing_back():
+    story = armed()
+    story.at(0.1, says(False, alive=False))
+    assert story.state.last_armed == {(LINK, "1/161")}
+    story.at(0.2, says(False))
+    assert story.state.last_armed == frozenset()
+
+
+@pytest.mark.parametrize(("heard", "left"), [(True, 0), (False, 1)])
+def test_a_reset_forgets_one_that_was_exchanged_and_none_whose_node_is_silent(heard, left):
+    story = armed()
+    story.at(0.1, says(True, alive=False))
+    while story.t < 4.0:
+        beats = [story.heartbeat(healthy=False)] if heard else []
+        story.at(story.t + 0.1, *beats, i.VehicleReport(STANDING))
+    hint = "one that was exchanged since is forgotten by safety/reset"
+    now = START + story.t
+    reasons = block_reasons(story.config, story.state, now)
+    text = state_text(story.config, story.state, reasons, now)
+    assert "ARMED when it was last received: mavlink_parachute 1/161" in text
+    assert (hint in text) is heard
+    story.at(4.1, i.ResetRequest(2))
+    assert len(story.state.last_armed) == left
+
+
+def test_what_is_armed_on_a_link_that_releases_nothing_is_nobodys_concern():
+    story = Story(SupervisorConfig(required_links=(LINK, UPF), deploy_links=(LINK,)))
+    story.at(0.1, says(True, UPF))
+    assert story.state.last_armed == frozenset()
+
+
+def test_made_up_names_do_not_grow_what_is_remembered():
+    story = Story().ready()
+    every = [says(True).status for _ in range(MOST_REMEMBERED + 5)]
+    told = [replace(one, device=f"1/{n}") for n, one in enumerate(every)]
+    story.at(0.1, *(i.ParachuteReport(LINK, one) for one in told))
+    assert len(story.state.last_armed) == MOST_REMEMBERED

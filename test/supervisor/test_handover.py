@@ -257,6 +257,7 @@ def leader(clock: float) -> State:
             faults_told=("slow",),
         ),
         released_since_reset=frozenset({("upf_can", "34")}),
+        last_armed=frozenset({("upf_can", "35")}),
         flight=ThisFlight(
             home_altitude=480.0,
             ground_pressure_altitude=490.0,
