@@ -37,13 +37,13 @@ from chute_ros.ros.supervisor_health import Health
 from chute_ros.ros.supervisor_inputs import SupervisorInputs
 from chute_ros.ros.supervisor_memory import SupervisorMemory
 from chute_ros.ros.supervisor_messages import (
+    CANNOT_BE_FULFILLED,
     decisions_task,
     state_message,
     summary_message,
 )
 from chute_ros.ros.supervisor_parameters import (
     PARAMETERS,
-    blind_rules,
     config_from,
     lease_from,
 )
@@ -127,11 +127,8 @@ class SafetySupervisorNode(SuiteNode):
             lambda report, now: self._turn(report),
             before=self.runtime.state.heard.vehicle.link_state,
         )
-        for rule in blind_rules(self.config, self.values["vehicle_sources"]):
-            self.get_logger().info(
-                f"rule '{rule}' is active and cannot be fulfilled: it needs a source besides the "
-                "autopilot (imu or odometry in vehicle_sources)"
-            )
+        for rule in self.config.blind_rules:
+            self.get_logger().info(f"rule '{rule}' {CANNOT_BE_FULFILLED}")
         mode = self.runtime.state.mode
         if mode in MODES:
             self.get_logger().warning(f"mode is {MODES[mode]} (parameter mode)")

@@ -18,6 +18,12 @@ from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.state_text import UNGUARDED, alarms, state_text
 
+#: What a rule has in place of conditions that can never hold.
+CANNOT_BE_FULFILLED = (
+    "cannot be fulfilled: it needs a source besides the autopilot (imu or odometry in "
+    "vehicle_sources)"
+)
+
 
 def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> SafetyState:
     """safety/state."""
@@ -114,6 +120,9 @@ def decisions_task(
         values[f"{link}: heartbeat age (s)"] = now - evidence.heard
         values[f"{link}: device healthy"] = evidence.device_healthy
     for rule in config.profile.rules:
+        if rule.name in config.blind_rules:
+            values[f"rule {rule.name}"] = CANNOT_BE_FULFILLED
+            continue
         counted = state.rule(rule.name)
         latched = ", acted on" if counted.latched else ""
         values[f"rule {rule.name}"] = f"{counted.level:.2f} s of {rule.hold:g} s{latched}"
@@ -127,6 +136,13 @@ def decisions_task(
 
 
 def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
+    if rule.name in config.blind_rules:
+        return RuleState(
+            name=rule.name,
+            action=int(rule.action),
+            hold=rule.hold,
+            conditions=[CANNOT_BE_FULFILLED],
+        )
     judged = judge(config, state, rule, now)
     counted = state.rule(rule.name)
     alive = state.stage in rule.states

@@ -18,6 +18,7 @@ from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
+from chute_ros.supervisor.rules import Profile
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,11 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
     ProfileError with every mistake of the profile."""
     given = settings_from(SupervisorParameters, values)
     _check_kill_links(given.config.kill_links)
+    profile = load_profile(given.profile, given.config.links)
     config = replace(
         given.config,
+        profile=profile,
+        blind_rules=_blind_rules(profile, given.vehicle.vehicle_sources),
         unmonitored_links=tuple(_given(given.unmonitored_links)),
         deploy_ladder=tuple(Rung.parse(text) for text in _given(given.deploy_ladder)),
         rank=given.lease.rank,
@@ -84,21 +88,19 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
             dict.fromkeys(config.links, given.limits)
             | _link_limits(_given(given.link_limits), config.links, given.limits)
         ),
-        profile=load_profile(given.profile, config.links),
     )
 
 
-def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
-    """The rules that can never be fulfilled: they rest on measurements while the autopilot is
-    silent, and it is the only source of measurements."""
+def _blind_rules(profile: Profile, sources: Sequence[str]) -> tuple[str, ...]:
+    """They rest on measurements while the autopilot is silent."""
     if set(sources) - {VEHICLE_STATE, MAVROS}:
-        return []
-    return [
+        return ()
+    return tuple(
         rule.name
-        for rule in config.profile.rules
+        for rule in profile.rules
         if rule.misses_the_autopilot
         and sum(one.weight for one in rule.conditions if one.is_silence) < rule.needed
-    ]
+    )
 
 
 def lease_from(values: Mapping[str, Any], config: SupervisorConfig, name: str) -> LeaseConfig:

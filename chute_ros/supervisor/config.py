@@ -93,6 +93,8 @@ class SupervisorConfig(Settings):
     ladder_step_timeout: float = parameter(
         2.0, "wait for the confirmation of a ladder step before the next step", 0.1, 60.0, "s"
     )
+    #: Rules of the profile that can never be fulfilled, as the autopilot is the only source.
+    blind_rules: tuple[str, ...] = ()
     #: Limits of each link, where they are not the standard ones.
     link_limits: Mapping[str, LinkLimits] = field(default_factory=lambda: _NO_LIMITS)
     #: As ArduPilot does.

@@ -176,6 +176,7 @@ def test_rules_are_bars_that_fill():
             conditions=["[x] acceleration 0.65 (below 2)"],
         ),
         RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
+        RuleState(name="autopilot lost", action=SafetyDecision.DEPLOY, conditions=["needs imu"]),
         RuleState(name="battery", action=0, alive=True, fulfilled=True, denied="not armed"),
     ]
     part = sections.rules(shown(rules=rules).rules, False)
@@ -186,7 +187,7 @@ def test_rules_are_bars_that_fill():
     ]
     assert "not acted on: not armed" in part
     assert "[x] acceleration 0.65 (below 2)" in part
-    assert "not active now ○ on the ground alone" in text_of(part)
+    assert "not active now ○ on the ground alone autopilot lost ○ needs imu" in text_of(part)
 
 
 def test_decisions_the_newest_first_with_what_came_of_them():

@@ -6,7 +6,7 @@ from supervisor_bench import QUICK
 from chute_ros.errors import ParameterError, ProfileError
 from chute_ros.ros.profile_files import load_profile
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.ros.supervisor_parameters import PARAMETERS, blind_rules, config_from
+from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 
 LINKS = ("mavlink_parachute",)
 SHIPPED = ("by_hand", "fixed_wing", "multirotor", "rocket")
@@ -45,9 +45,9 @@ def values(**given: object) -> dict[str, object]:
 
 
 def test_a_rule_that_can_never_be_fulfilled_is_named():
-    config = config_from(values())
-    assert blind_rules(config, ["vehicle/state"]) == ["autopilot lost and falling"]
-    assert blind_rules(config, ["vehicle/state", "imu"]) == []
+    sources = ["vehicle/state", "imu"]
+    assert config_from(values()).blind_rules == ("autopilot lost and falling",)
+    assert config_from(values(vehicle_sources=sources)).blind_rules == ()
 
 
 @pytest.mark.parametrize(

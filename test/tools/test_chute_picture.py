@@ -43,6 +43,7 @@ def test_a_vehicle_in_flight(heard):
         ),
         RuleState(name="excess tilt", action=SafetyDecision.DEPLOY, alive=True, hold=0.25),
         RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
+        RuleState(name="autopilot lost", action=SafetyDecision.DEPLOY, conditions=["needs imu"]),
     ]
     told = {"decision_id": 3, "decision_action": 2, "decision_rule": "links"}
     unusable = ["attitude_error: never received", "tilt_deg: stuck", "age: never received"]
@@ -65,11 +66,12 @@ def test_a_vehicle_in_flight(heard):
         "  height             61.2 m, <1 s ago",
         "  vertical speed     0.0 m/s, <1 s ago",
         "  battery            15.8 V, 87 %, 1 s ago",
-        "rules: 2 of 3 active, 1 counting",
+        "rules: 2 of 4 active, 1 counting",
         "  free fall: DEPLOY, 0.2 of 0.5 s",
         "      [x] acceleration 0.65 (below 2)",
         "      [ ] tilt_deg 13.34 (above 45)",
         "  not counting: excess tilt",
+        "  autopilot lost: needs imu",
         "newest decision: FLIGHT_BLOCK_RELEASE by rule 'links' (number 3)",
     ]
     assert heard.view().well

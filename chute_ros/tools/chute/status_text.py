@@ -314,6 +314,7 @@ def rule_lines(rules: Sequence[RuleView]) -> Iterator[StatusLine]:
             yield StatusLine(f"      not acted on: {one.denied}", "warn")
     if waiting := [one.name for one in rules if one.active and not one.counts]:
         yield StatusLine(f"  not counting: {', '.join(waiting)}", rows=1)
+    yield from (StatusLine(f"  {one.name}: {one.never}", "quiet") for one in rules if one.never)
 
 
 def _newest(picture: VehiclePicture) -> StatusLine:

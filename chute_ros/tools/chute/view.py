@@ -121,6 +121,11 @@ class RuleView:
         return self.level > 0.0 or self.fulfilled or self.acted_on or bool(self.denied)
 
     @property
+    def never(self) -> str:
+        """Why it can never be fulfilled; empty: it can."""
+        return "; ".join(self.conditions) if not (self.active or self.counts) else ""
+
+    @property
     def does(self) -> str:
         """What it is at, in words."""
         if self.action == _ALARM and (self.acted_on or self.fulfilled):

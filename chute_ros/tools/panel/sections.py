@@ -156,8 +156,10 @@ def rules(those: Sequence[RuleView], old: bool) -> str:
     first. old: the supervisor is silent."""
     shown = [one for one in those if one.active or one.counts]
     rows = "".join(_rule(one) for one in sorted(shown, key=lambda one: not one.counts))
-    if others := [one.name for one in those if one not in shown]:
-        rows += _row("not active now", ", ".join(others), "quiet")
+    others = [one for one in those if one not in shown]
+    if waiting := [one.name for one in others if not one.never]:
+        rows += _row("not active now", ", ".join(waiting), "quiet")
+    rows += "".join(_row(one.name, one.never, "quiet") for one in others if one.never)
     return _card("Rules", rows or _row("", "none", ""), old)
 
 
