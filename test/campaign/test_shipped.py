@@ -68,4 +68,5 @@ def test_so_has_the_supervisor(vehicle: str) -> None:
     values = {**standard(supervisor_parameters.PARAMETERS), **told}
     config = supervisor_parameters.config_from(values)
     assert all(config.limits(link) == flies.limits(link) for link in flies.links)
-    assert replace(config, link_limits=flies.link_limits) == flies
+    # Nothing is decided by what cannot be fulfilled; each flight has sources of its own.
+    assert replace(config, link_limits=flies.link_limits, blind_rules=()) == flies

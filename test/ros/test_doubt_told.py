@@ -82,6 +82,7 @@ def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(stage, a
     evidence = replace(WELL, devices=MappingProxyType({"1/161": replace(ARMED, armed=armed)}))
     links = MappingProxyType({**state.heard.links, link: evidence})
     state = replace(state, stage=stage, heard=replace(state.heard, links=links))
+    state = replace(state, last_armed=frozenset({(link, "1/161")} if armed else ()))
     told = state_message(CONFIG, safety_told(CONFIG, "", state, {}, NOW), Time()).state_text
     assert told == text.format(f"{link} 1/161")
     assert decisions_task("safety_supervisor", CONFIG, state, NOW).message.endswith(told)
@@ -95,6 +96,7 @@ def test_the_summary_is_the_same_in_a_few_fields():
         stage=Stage.BLOCKED,
         heard=replace(state.heard, links=MappingProxyType({link: armed})),
         released_since_reset=frozenset({(link, "1/162")}),
+        last_armed=frozenset({(link, "1/161")}),
         alarming=Alarms(alarms=("one", "two")),
     )
     told = safety_told(CONFIG, "supervisor", state, {}, NOW)
