@@ -1,4 +1,7 @@
-"""Runs a module at a terminal that nobody looks at: bench.at_terminal MODULE ARGUMENTS."""
+"""Runs a module at a terminal that nobody looks at: bench.at_terminal TEXT MODULE ARGUMENTS.
+
+Says that it looks once this text has come.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,19 @@ import struct
 import sys
 import termios
 
+#: What an onlooker of the bench says once it sees a vehicle.
+LOOKS = "looks"
 
-def _read(ours: int) -> None:
+
+def _read(ours: int, until: bytes) -> None:
+    seen, looks = b"", False
     # It ends with an error when the other end is closed.
     with contextlib.suppress(OSError):
-        while os.read(ours, 65536):
-            pass
+        while told := os.read(ours, 65536):
+            seen = (seen + told)[-65536:]
+            if not looks and until in seen:
+                looks = True
+                print(LOOKS, flush=True)
 
 
 if __name__ == "__main__":
@@ -23,10 +33,10 @@ if __name__ == "__main__":
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 120, 0, 0))
     if os.fork() == 0:
         os.close(theirs)
-        _read(ours)
+        _read(ours, sys.argv[1].encode())
         os._exit(0)
     os.close(ours)
     for stream in (0, 1):
         os.dup2(theirs, stream)
     os.environ["TERM"] = "xterm-256color"
-    os.execv(sys.executable, [sys.executable, "-m", *sys.argv[1:]])
+    os.execv(sys.executable, [sys.executable, "-m", *sys.argv[2:]])

@@ -11,8 +11,8 @@ import argparse
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
 from bench.command import at_least, run, with_children
@@ -29,7 +29,7 @@ HEADING = "Kill switch"
 OURS, ROS, BARE = "chute_ros", "ROS alone", "bare relay"
 #: Each peer rests so long between its rounds at least, s: for the supervisor the kill of the last
 #: one is over after its kill_timeout, and the vehicle is known to be armed again.
-_REST, _KILL_TIMEOUT = 0.4, 0.3
+REST, _KILL_TIMEOUT = 0.4, 0.3
 #: A late answer is a late answer: it is measured, not given up.
 _SERVICE_TIMEOUT, _ROUND_TIMEOUT = 2.0, 3.0
 _READY_TIMEOUT = 40.0
@@ -83,9 +83,28 @@ def measure(
     namespace: str, processes: Processes, starts: dict[str, Start], count: int
 ) -> list[Peer]:
     """Start each peer, and have them take turns for so many rounds."""
+    with started(namespace, processes, starts) as peers:
+        for number in range(count):
+            for how in (IDLE, LOADED):
+                for peer in peers:
+                    rest(peers, REST / len(peers))
+                    round_of(peer, peers, how, count)
+            processes.check()
+            if (number + 1) % 25 == 0 or number + 1 == count:
+                print(f"  {number + 1} of {count} rounds", file=sys.stderr, flush=True)
+        # A kill that was sent twice may come late.
+        rest(peers, REST)
+        return peers
+
+
+@contextmanager
+def started(
+    namespace: str, processes: Processes, starts: dict[str, Start]
+) -> Iterator[list[Peer]]:
+    """Peers that have had a first round each."""
     definitions = Definitions(load_data_types("", "bench"))
     ports = iter(free_udp_ports(2 * len(starts)))
-    peers = []
+    peers: list[Peer] = []
     with ExitStack() as stack:
         for name, start in starts.items():
             bus, network = next(ports), next(ports)
@@ -94,25 +113,15 @@ def measure(
             stack.callback(ends.close)
             peers.append(Peer(name, ends))
         for peer in peers:
-            _await_ready(peer, peers, processes)
+            await_ready(peer, peers, processes)
         # What was asked for before all was there may still come.
-        _rest(peers, _SERVICE_TIMEOUT)
+        rest(peers, _SERVICE_TIMEOUT)
         for peer in peers:
             peer.ends.kills = 0
-        for number in range(count):
-            for how in (IDLE, LOADED):
-                for peer in peers:
-                    _rest(peers, _REST / len(peers))
-                    _round(peer, peers, how, count)
-            processes.check()
-            if (number + 1) % 25 == 0 or number + 1 == count:
-                print(f"  {number + 1} of {count} rounds", file=sys.stderr, flush=True)
-        # A kill that was sent twice may come late.
-        _rest(peers, _REST)
-    return peers
+        yield peers
 
 
-def _rest(peers: list[Peer], seconds: float) -> None:
+def rest(peers: list[Peer], seconds: float) -> None:
     """All go on saying how they are: none may seem lost while another has its turn."""
     for peer in peers:
         peer.ends.arm()
@@ -122,10 +131,11 @@ def _rest(peers: list[Peer], seconds: float) -> None:
             peer.ends.listen(0.005)
 
 
-def _round(peer: Peer, peers: list[Peer], how: str, count: int) -> None:
+def round_of(peer: Peer, peers: list[Peer], how: str, count: int) -> None:
+    """One of so many, idle or under load; one that is missed is counted."""
     if how == LOADED:
         peer.ends.flood.set(_LOAD * NOMINAL_RATE)
-        _rest(peers, _LOAD_BEFORE)
+        rest(peers, _LOAD_BEFORE)
     try:
         peer.rounds[how].append(peer.ends.kill_switch(_ROUND_TIMEOUT))
     except WrongOrderError as error:
@@ -186,12 +196,12 @@ def _start_bare(_: str, processes: Processes, bus: int, network: int) -> None:
     processes.start("relay", "bench.bare_relay", str(bus), str(network))
 
 
-def _await_ready(peer: Peer, peers: list[Peer], processes: Processes) -> None:
+def await_ready(peer: Peer, peers: list[Peer], processes: Processes) -> None:
     """Until a first round succeeds: all is started, and everybody has heard everybody."""
     end = time.monotonic() + _READY_TIMEOUT
     while True:
         processes.check()
-        _rest(peers, _REST)
+        rest(peers, REST)
         try:
             peer.ends.kill_switch(1.0)
             return

@@ -15,6 +15,8 @@ from urllib.parse import urlencode, urlsplit
 
 import socketio
 
+from bench.at_terminal import LOOKS
+
 _TRIES, _EVERY = 60, 0.5  # s
 
 
@@ -37,7 +39,7 @@ async def look(address: str) -> None:
         socketio_path="/_nicegui_ws/socket.io",
         transports=["websocket"],
     )
-    print("looks", flush=True)
+    print(LOOKS, flush=True)
     await client.wait()
 
 

@@ -19,7 +19,7 @@ KILL_SWITCH, DECODING, TELEMETRY = (
 )
 FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
 FEW += ("--rounds", "2", "--deploys", "2", "--cost-seconds", "1", "--message-batches", "3")
-FEW += ("--executor-requests", "2", "--onlooker-requests", "2", "--onlooker-deploys", "2")
+FEW += ("--executor-requests", "2", "--onlooker-requests", "4", "--onlooker-deploys", "4")
 #: The sections of docs/evidence/bench.md, and those that have pages of their own.
 KEPT = ("Kill switch", "A vehicle", "Decoding", "Decoding a line", "Through the node")
 ELSEWHERE = ("Executors", "Onlookers")
