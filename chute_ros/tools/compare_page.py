@@ -28,6 +28,7 @@ from chute_ros.tools.compare_words import (
     INTRODUCTION,
     RULES,
     SHORT,
+    WHY_BETTER,
 )
 from chute_ros.tools.pages import summary, table
 
@@ -74,6 +75,7 @@ def page(lines: Sequence[Compared], run: Run, pictures: Sequence[str]) -> str:
         "## Where others are better",
         BETTER,
         _table_of_better(plain),
+        WHY_BETTER,
         "## Excused, and saved by a peer",
         EXCUSED,
         _excused(plain),

@@ -55,6 +55,12 @@ Every class in which a peer has fewer missed or late or fewer false flights than
 without any excuse, or releases earlier: the median over the flights in which both released, of
 five at least. Seeds: flights that the peer ends well and this product does not, or those in which
 the peer is earliest. A guard that never acts has no false flight."""
+WHY_BETTER = """\
+PX4's failure detector takes a roll or pitch beyond 60 degrees for 0.3 s for a failure, by its
+estimator alone. This product waits for a second origin besides the attitude: a force that is
+missing, or a sink, which comes the later the flatter an aeroplane spins. So a wrong estimator ends
+flights of PX4 that go well. `free fall` of an aeroplane waits 0.5 s: sticks that are reversed in a
+descent, and push it over, leave it far from its target and without force for 0.3 s."""
 EXCUSED = """\
 Flights that the campaign counts as "no time" or "not told" for this product, and that a peer ends
 well: the excuse is not one of physics."""
