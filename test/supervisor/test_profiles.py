@@ -659,3 +659,21 @@ def test_a_descent_that_is_caught_with_full_thrust_is_no_sink_that_goes_on(slows
         told = {"target_vertical_speed": -9.0 if descends else 0.0, "acceleration": 9.8 + slows}
         story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed, **told)
     assert bool(story.fired()) is fires
+
+
+def test_sticks_that_are_reversed_in_a_descent_end_no_flight_of_an_aeroplane():
+    """From one bank to the other, 120 degrees away, within 0.3 s; it rolls with 150 degrees a
+    second, 0.1 s later, and is pushed over meanwhile."""
+    story, force, speed = Story(shipped("fixed_wing")).ready(), 9.8, -5.0
+    story.fly(2.0, EVERY, vertical_speed=speed, height=100.0, attitude_error=0.0, tilt=60.0)
+    begun, far = story.t, 0
+    while (passed := story.t + 0.05 - begun) < 0.9:
+        rolled = max(0.0, 150.0 * (passed - 0.1))
+        error = min(120.0, 400.0 * passed) - rolled
+        far += error > 45.0
+        force, speed = max(1.5, force - 2.6), speed - 0.05 * (9.8 - force)
+        told = {"acceleration": force, "vertical_speed": speed, "attitude_error": error}
+        story.fly(story.t + 0.05, 0.05, height=100.0 + speed, tilt=abs(60.0 - rolled), **told)
+    story.fly(story.t + 1.0, 0.05, vertical_speed=speed, attitude_error=0.0, tilt=60.0)
+    assert far == 10, "for 0.5 s, and without force for most of it"
+    assert story.fired() == []
