@@ -38,7 +38,7 @@ class Track:
         for output in outputs:
             if isinstance(output, i.Decide) and not output.again:
                 action = output.decision.action
-                sign = action.name.replace("FLIGHT_", "").replace("BLOCK_RELEASE", "RELEASE")
+                sign = action.name.replace("FLIGHT_", "").replace("BLOCK_RELEASE", "UNBLOCK")
                 self._marks.append(Mark(seconds, sign, told(output), ACTION_TONES[action]))
         if state is None:
             return

@@ -83,19 +83,19 @@ def marks(*those):
 
 
 def test_the_names_of_decisions_of_one_moment_stand_below_each_other():
-    those = marks((10.0, "KILL"), (10.05, "DEPLOY"), (10.1, "BLOCK"), (60.0, "RELEASE"))
+    those = marks((10.0, "KILL"), (10.05, "DEPLOY"), (10.1, "BLOCK"), (60.0, "UNBLOCK"))
     found = placed(those, 0.0, 100.0)
     assert [(one.mark.text, one.lane) for one in found] == [
         ("KILL", 0),
         ("DEPLOY", 1),
         ("BLOCK", 2),
-        ("RELEASE", 0),
+        ("UNBLOCK", 0),
     ]
     assert not any(one.leftwards for one in found)
 
 
 def test_a_name_does_not_run_past_the_end():
-    (one,) = placed(marks((99.0, "RELEASE")), 0.0, 100.0)
+    (one,) = placed(marks((99.0, "UNBLOCK")), 0.0, 100.0)
     assert one.leftwards
 
 

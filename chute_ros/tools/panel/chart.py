@@ -16,7 +16,7 @@ _AXES = (("height", "m", "#2f74c0"), ("vertical speed", "m/s", "#b06a00"))
 #: well as in the light.
 _MARKS = {
     Action.FLIGHT_BLOCK.name: ("BLOCK", "#b5850f"),
-    Action.FLIGHT_BLOCK_RELEASE.name: ("RELEASE", "#2f9e6b"),
+    Action.FLIGHT_BLOCK_RELEASE.name: ("UNBLOCK", "#2f9e6b"),
     Action.KILL.name: ("KILL", "#d0404f"),
     Action.DEPLOY.name: ("DEPLOY", "#9a63d0"),
 }
