@@ -306,7 +306,7 @@ def _not_fallen(motion: tuple[Moment, ...], drop: Drop) -> str:
 def _not_felt(motion: tuple[Moment, ...]) -> str:
     """It speeded up downwards, and no force was missing."""
     known = [one for one in motion if not any(map(math.isnan, one))]
-    if not _carried(motion):
+    if not _carries(motion):
         return ""
     felt, best, over = 0.0, 0.0, 0.0
     for after, before in _backwards(known):
@@ -329,7 +329,7 @@ def _still_denied(motion: tuple[Moment, ...], barometer: Rise, before: Mapping[s
     """A sink of which no force told as it began: an error that grows no more is no truth. It is
     over once the estimator is back, a force is missing, or a barometer tells of it."""
     sinks = bool(motion) and motion[-1][1] < -1.0
-    if not sinks or not math.isnan(barometer.rate) or not _carried(motion):
+    if not sinks or not math.isnan(barometer.rate) or not _carries(motion):
         return ""
     return before.get(VERTICAL_SPEED, "")
 
@@ -436,6 +436,11 @@ def _carried(motion: tuple[Moment, ...], leaning: bool = False) -> list[Moment]:
     felt = [one[2] for one in known]
     forces = [one[2] * one[3] for one in known] if leaning else felt
     return known if _lives(felt) and _in_full(forces) else []
+
+
+def _carries(motion: tuple[Moment, ...]) -> bool:
+    """Upright, or as in a bank that is flown level."""
+    return bool(_carried(motion) or _carried(motion, leaning=True))
 
 
 def _in_full(forces: list[float]) -> bool:

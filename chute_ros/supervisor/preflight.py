@@ -22,7 +22,12 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import ON_GROUND, Stage
-from chute_ros.supervisor.measurements import PRESSURE_ALTITUDE
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    PRESSURE_ALTITUDE,
+    TILT,
+    VERTICAL_SPEED,
+)
 from chute_ros.supervisor.state import CONTRADICTED_FOR, State
 
 #: MAV_STATE of an autopilot that cannot fly, or only ends a flight (MAVLink common.xml).
@@ -167,6 +172,9 @@ def _measured_problems(config: SupervisorConfig, state: State, now: float) -> li
 
 #: Measurement on which a rule may rest -> what nobody sees of a vehicle that does not tell it.
 _BLIND = {
+    VERTICAL_SPEED: "no vertical speed is reported: a sink is seen by the heights alone",
+    ACCELERATION: "no acceleration is reported: a fall is seen by its speed alone",
+    TILT: "no attitude is reported: what tips over is seen once it falls",
     "sink_beyond_target": "no target is reported: an uncommanded level sink is only an alarm",
     "attitude_error": "no commanded attitude is reported: "
     "an attitude flown on purpose looks like an accident",

@@ -70,11 +70,11 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
         return felt, why or ("too little was reported lately" if math.isnan(felt) else "")
     if name in _ERRORS:
         return _error(config, state, name, now)
-    if name == SINK_BEYOND_TARGET and _speed_is_weak(config, state, now):
-        beyond = _sink_beyond_target(config, state, now)
-        if not math.isnan(beyond):
-            return beyond, ""
     known = state.measured(name)
+    if name == SINK_BEYOND_TARGET:
+        beyond = _sink_beyond_target(config, state, now)
+        if beyond > known.value or (not math.isnan(beyond) and _speed_is_weak(config, state, now)):
+            return beyond, ""
     why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
         return known.value, ""
@@ -108,8 +108,8 @@ def _speed_is_weak(config: SupervisorConfig, state: State, now: float) -> bool:
 
 
 def _sink_beyond_target(config: SupervisorConfig, state: State, now: float) -> float:
-    """By the heights of the estimator and of the barometer, whichever sinks less, m/s: a speed
-    that is noise hides no sink that both tell. NaN: one of them, or the command, is not known."""
+    """By the heights of the estimator and of the barometer, whichever sinks less, m/s: one wrong
+    speed hides no sink that both tell. NaN: one of them, or the command, is not known."""
     last, limits = state.heard.commanded_speed, config.profile.limits[SINK_BEYOND_TARGET]
     if not now - last.measured_at <= limits.max_age:
         return math.nan

@@ -878,3 +878,59 @@ def test_whatever_one_sensor_of_a_rocket_that_climbs_tells_fires_nothing(
     assert speed > 20.0
     assert teller.story.state.stage is Stage.IN_FLIGHT
     assert teller.story.fired() == []
+
+
+@AIRCRAFT
+@pytest.mark.parametrize(("bank", "drift"), [(40.0, 3.0), (55.0, 2.0)])
+@pytest.mark.parametrize("target", [True, False])
+def test_an_estimator_that_sinks_in_a_level_bank_is_denied_by_the_force(
+    profile, bank, drift, target
+):
+    """Without a barometer: the part of the force that points upwards carries it in full."""
+    teller, height, speed = hovering(profile, 100.0, 2.0, barometer=False), 100.0, 0.0
+    told: dict[str, Any] = {"target_vertical_speed": 0.0, "attitude_error": 3.0} if target else {}
+    for step in range(130):
+        tilt = min(bank, 2.0 * step)
+        if step > 30:
+            speed -= drift * EVERY
+            height += speed * EVERY
+        force = GRAVITY / math.cos(math.radians(tilt))
+        teller.tell(height=height, vertical_speed=speed, tilt=tilt, force=force, **told)
+    assert teller.story.fired() == []
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("hides", [1.0, 0.5])
+@pytest.mark.parametrize("target", [True, False])
+def test_a_speed_that_hides_a_level_sink_hides_it_from_nobody_whom_both_heights_tell(
+    profile, hides, target
+):
+    """9 m/s; the vertical speed alone is wrong, by this part of it."""
+    teller, height, speed = hovering(profile, 110.0, 2.0), 110.0, 0.0
+    told: dict[str, Any] = {"target_vertical_speed": 0.0, "attitude_error": 4.0} if target else {}
+    while height > 10.0 and not deployed(teller):
+        force = 6.8 if speed > -9.0 else 9.8
+        speed = max(speed - 0.3, -9.0)
+        height += speed * EVERY
+        wrong = (1.0 - hides) * speed + teller.noise(0.1)
+        parts = {"height": height, "true_height": height, "tilt": 8.0, "force": force}
+        teller.tell(vertical_speed=wrong, **parts, **told)
+    assert deployed(teller) is target
+    assert (height > 80.0) is target
+    if not target:
+        assert any("it sinks faster than descents" in one for one in teller.story.alarms())
+
+
+@pytest.mark.parametrize("wrong", [lambda speed, _: 0.0, lambda speed, t: speed - 3.0 * t])
+def test_a_wrong_speed_in_a_dive_that_was_commanded_ends_no_flight_of_an_aeroplane(wrong):
+    """20 degrees, 10 m/s; the heights, the force and the attitude are right."""
+    teller, height, speed = hovering("fixed_wing", 150.0, 2.0), 150.0, 0.0
+    for step in range(60):
+        change = -3.0 if speed > -10.0 else 0.0
+        speed, tilt = max(speed - 0.3, -10.0), max(3.0, 20.0 * min(1.0, step * EVERY))
+        height += speed * EVERY
+        force = (GRAVITY + change) / math.cos(math.radians(tilt))
+        parts = {"height": height, "true_height": height, "tilt": tilt, "force": force}
+        told = wrong(speed, step * EVERY) + teller.noise(0.1)
+        teller.tell(vertical_speed=told, attitude_error=4.0, **parts)
+    assert teller.story.fired() == []

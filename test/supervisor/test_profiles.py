@@ -287,7 +287,7 @@ def test_every_rule_has_its_story(name):
     told |= {"sinks fast under a canopy", "killed and falling", "ballistic"}
     told |= {"fall that its estimator does not tell", "off its command", "falls flat"}
     told |= {"spin that its estimator does not tell", "main overdue", "main late"}
-    told |= {"sink that its estimator does not tell", "sinks on"}
+    told |= {"sink that its estimator does not tell", "sinks on", "no canopy reported"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -520,6 +520,21 @@ def test_a_main_that_is_overdue_is_ordered(sinks, fires, anew):
     if fires:
         assert story.newest(D).rule == "main overdue"
         assert 90.0 < height < 150.0 - sinks
+
+
+@pytest.mark.parametrize("sinks", [16.0, 30.0, 45.0])
+def test_a_rocket_that_tumbles_down_without_a_word_of_a_canopy_is_told_and_ordered(sinks):
+    """As slowly as under a fast drogue; nothing ever says LAUNCHED."""
+    story, height, speed = Story(shipped("rocket")).ready().fly(1.0, height=1500.0), 1500.0, 0.0
+    while height > 20.0:
+        speed = max(speed - 0.98 * (1.0 - (speed / sinks) ** 2), -sinks)
+        height += 0.1 * speed
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=speed)
+        if story.fired():
+            break
+    assert story.newest(K).rule == "main overdue"
+    assert 70.0 < height < 150.0 - sinks
+    assert any("nothing reports a canopy" in one for one in story.alarms()) is (sinks > 20.0)
 
 
 def test_under_a_drogue_that_is_the_parachute_a_main_that_is_late_is_told():
