@@ -225,6 +225,9 @@ def _error(config: SupervisorConfig, state: State, name: str, now: float) -> tup
     else:
         speed = measured(config, state, VERTICAL_SPEED, now)
         error = speed_error(state.heard.motion, speed, pressure_change(config, state, now))
+        # An estimator whose speed alone is wrong hides no sink: its heights tell it.
+        by_heights = abs(pressure_rate(config, state, now) - climb_rate(config, state, now))
+        error = error if math.isnan(by_heights) else min(error, by_heights)
     return error, "too little is reported at the same time" if math.isnan(error) else ""
 
 
