@@ -113,8 +113,9 @@ def test_a_kill_that_an_aeroplane_refuses_is_followed_by_the_other_way(bench):
     decision = rig.decide(Action.KILL)
     report = rig.report(decision, Outcome.CONFIRMED)
     assert not autopilot.model.armed
-    (refused,), (forced,) = autopilot.heard_command(TERMINATE), autopilot.forced
-    assert refused[0] < forced[0]
+    # On a busy machine it is sent again before the refusal is read.
+    refused, (forced,) = autopilot.heard_command(TERMINATE), autopilot.forced
+    assert refused[0][0] < forced[0]
     assert "kill (forced_disarm): the autopilot reports motors off" in report.detail
     assert "kill (flight_termination): failed" in report.detail
 
