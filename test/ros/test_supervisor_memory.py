@@ -39,8 +39,8 @@ def kill_and_start_again(pair, **parameters):
     pair.bench.until(lambda: "a" in pair.claims, "it is back")
 
 
-def the_file(pair):
-    folder = pair.processes.ros_home / "chute_ros" / "resume"
+def the_file(pair, folder="resume"):
+    folder = pair.processes.ros_home / "chute_ros" / folder
     return pair.bench.until(lambda: list(folder.glob("*.json")), "something is kept")[0]
 
 
@@ -169,19 +169,22 @@ def tells(pair, stage, deployed=False, armed=False):
     client.destroy_publisher(publisher)
 
 
+def start_again_set_otherwise(pair, path, damaged):
+    pair.send_signal("a", signal.SIGSTOP)
+    if damaged:
+        path.write_text("[[")
+    kill_and_start_again(pair, deploy_timeout=19.0)
+    pair.states.clear()
+
+
 @pytest.mark.parametrize("damaged", [False, True])
 def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pair, damaged):
     pair.start("a", 0, **ALONE)
     pair.await_stage(SafetyState.READY)
     tells(pair, SafetyState.BLOCKED, deployed=True)
-    folder = pair.processes.ros_home / "chute_ros" / "released"
-    path = pair.bench.until(lambda: list(folder.glob("*.json")), "it is kept")[0]
-    pair.send_signal("a", signal.SIGSTOP)
-    if damaged:
-        path.write_text("[[")
-    # Given a module that started anew too, and a supervisor that was set otherwise
-    kill_and_start_again(pair, deploy_timeout=19.0)
-    pair.states.clear()
+    path = the_file(pair, "released")
+    start_again_set_otherwise(pair, path, damaged)
+    # Given a module that started anew too
     tells(pair, SafetyState.BLOCKED)
     # A heartbeat may be late, which is a reason of its own.
     alone = pair.bench.until(
@@ -203,15 +206,10 @@ def test_one_that_was_armed_as_its_node_died_is_told_whatever_starts_anew(pair, 
     pair.start("a", 0, **ALONE)
     pair.await_stage(SafetyState.READY)
     tells(pair, SafetyState.ARMED, armed=True)
-    folder = pair.processes.ros_home / "chute_ros" / "armed"
-    path = pair.bench.until(lambda: list(folder.glob("*.json")), "it is kept")[0]
+    path = the_file(pair, "armed")
     pair.link.beating = False
     pair.await_stage(SafetyState.BLOCKED)
-    pair.send_signal("a", signal.SIGSTOP)
-    if damaged:
-        path.write_text("[[")
-    kill_and_start_again(pair, deploy_timeout=19.0)
-    pair.states.clear()
+    start_again_set_otherwise(pair, path, damaged)
     pair.await_stage(SafetyState.BLOCKED)
     told = pair.states[-1].state_text
     unknown = f"a parachute that is not known ({path} is damaged)"

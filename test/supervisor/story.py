@@ -27,10 +27,12 @@ from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import CoreTurn
 from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state_text import state_text
 from chute_ros.supervisor.wakes import next_deadline
 
 LINK = "mavlink_parachute"
@@ -353,6 +355,12 @@ class Story:
         """The one answer to a request."""
         (answer,) = self.answers(token)
         return answer
+
+    def text(self) -> str:
+        """The sentence that is shown of its state now."""
+        now = START + self.t
+        reasons = block_reasons(self.config, self.state, now)
+        return state_text(self.config, self.state, reasons, now)
 
     def alarms(self) -> list[str]:
         """What was said as an alarm."""

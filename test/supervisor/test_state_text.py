@@ -10,19 +10,11 @@ from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.preflight import block_reasons
-from chute_ros.supervisor.state_text import alarms, state_text
+from chute_ros.supervisor.state_text import alarms
 
 UPF = "upf_can"
 NOT_OURS = "not by an order of this supervisor"
 BOTH: dict[str, Any] = {"required_links": (LINK, UPF), "deploy_links": (LINK, UPF)}
-
-
-def text(story: Story) -> str:
-    """What is shown of it now."""
-    now = START + story.t
-    reasons = block_reasons(story.config, story.state, now)
-    return state_text(story.config, story.state, reasons, now)
 
 
 def told(story: Story) -> tuple[str, ...]:
@@ -53,36 +45,36 @@ def goes_on(story: Story, until: float, healthy: bool = True, **states: LinkStat
 
 def test_a_vehicle_that_is_guarded_says_no_more_than_that_it_flies():
     story = flying()
-    assert text(story) == "IN_FLIGHT"
+    assert story.text() == "IN_FLIGHT"
     assert told(story) == ()
 
 
 def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded():
     story = goes_on(flying(), 2.0, upf_can=LinkState.LOST)
     warning = "rule 'link lost' warns: nothing is received from a device"
-    assert text(story) == f"IN_FLIGHT: {warning}"
+    assert story.text() == f"IN_FLIGHT: {warning}"
     assert told(story) == (warning,)
     # When it is heard again, then the warning is over.
     story = goes_on(story, 4.0)
-    assert text(story) == "IN_FLIGHT"
+    assert story.text() == "IN_FLIGHT"
     assert told(story) == ()
 
 
 def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded():
     story = goes_on(flying(), 2.0, mavlink_parachute=LinkState.LOST, upf_can=LinkState.LOST)
     why = f"no parachute can be reached: {LINK} is LOST, {UPF} is LOST"
-    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert story.text() == f"IN_FLIGHT, NOT GUARDED: {why}"
     assert told(story) == ("rule 'link lost' warns: nothing is received from a device", why)
-    assert text(goes_on(story, 4.0)) == "IN_FLIGHT"
+    assert goes_on(story, 4.0).text() == "IN_FLIGHT"
 
 
 def test_parachutes_that_are_received_and_not_fit_guard_nobody():
     story = goes_on(flying(), 2.0, healthy=False)
     why = f"no parachute can be relied on: {LINK} is not healthy, {UPF} is not healthy"
-    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert story.text() == f"IN_FLIGHT, NOT GUARDED: {why}"
     story = goes_on(flying(), 2.0, healthy=False, upf_can=LinkState.LOST)
     why = f"no parachute can be relied on: {LINK} is not healthy, {UPF} is LOST"
-    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert story.text() == f"IN_FLIGHT, NOT GUARDED: {why}"
 
 
 def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded():
@@ -91,7 +83,7 @@ def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded():
     while story.t < 4.0:
         story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF))
     why = "nothing reports whether it falls: no vertical speed, acceleration or height"
-    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert story.text() == f"IN_FLIGHT, NOT GUARDED: {why}"
     # and both of what is wrong is an alarm.
     lost = "rule 'autopilot lost' warns: the autopilot is silent; if it falls, deploy by hand"
     assert told(story) == (lost, why)
@@ -105,12 +97,12 @@ def test_heights_alone_are_enough_to_see_a_fall():
         step += 1
         moved = {**flies, "height": 50.0 + 0.01 * (step % 7)}
         story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF), vehicle(**moved))
-    assert "nothing reports" not in text(story)
+    assert "nothing reports" not in story.text()
 
 
 def test_a_profile_that_releases_nothing_itself_says_who_does():
     story = flying("by_hand")
-    assert text(story) == (
+    assert story.text() == (
         "IN_FLIGHT: only a person releases: profile by_hand has no rule that does"
     )
     assert told(story) == (), "it was chosen"
@@ -135,27 +127,27 @@ def test_a_kill_says_by_which_rule_why_when_and_where():
     assert story.state.stage is Stage.KILLING
     rule = story.newest(Action.KILL).rule
     says = next(one.says for one in story.config.profile.rules if one.name == rule)
-    assert f"by rule '{rule}' ({says})" in text(story)
-    assert text(story).startswith("KILLING: the motors are being stopped, ordered 0 s ago at 9")
-    assert text(story).endswith("; the deploy follows")
+    assert f"by rule '{rule}' ({says})" in story.text()
+    assert story.text().startswith("KILLING: the motors are being stopped, ordered 0 s ago at 9")
+    assert story.text().endswith("; the deploy follows")
 
 
 def test_a_kill_by_a_person_says_whose_and_that_no_deploy_follows():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.KillRequest(3, "operator", "Anna: the wind", kill_only=True))
-    assert text(story) == (
+    assert story.text() == (
         "KILLING: the motors are being stopped, ordered 0 s ago at 50.0 m by operator: Anna: the "
         "wind; no deploy follows"
     )
     story.at(1.2, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
-    assert text(story).startswith("KILLING: the motors are off, ordered 0 s ago")
+    assert story.text().startswith("KILLING: the motors are off, ordered 0 s ago")
 
 
 def test_a_deploy_says_which_step_for_whom_and_whose_order():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, i.DeployRequest(5, False, "Anna: it burns"))
     story.at(1.1, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
-    assert text(story) == (
+    assert story.text() == (
         f"DEPLOYING: {LINK} is to release (step 1 of 1), ordered 0 s ago at 50.0 m by operator: "
         "Anna: it burns"
     )
@@ -163,7 +155,7 @@ def test_a_deploy_says_which_step_for_whom_and_whose_order():
     story.fly(2.0, height=42.0)
     story.at(2.0, parachute(deployed=True))
     story.fly(4.0, height=40.0)
-    assert text(story) == (
+    assert story.text() == (
         f"DEPLOYED: {LINK} 1/161 released 2 s ago at 42.0 m, by operator: Anna: it burns"
     )
 
@@ -171,7 +163,7 @@ def test_a_deploy_says_which_step_for_whom_and_whose_order():
 def test_a_parachute_that_opens_by_itself_was_not_ordered():
     story = Story(shipped("multirotor")).flying().fly(1.0)
     story.at(1.0, story.heartbeat(), parachute(deployed=True))
-    assert text(story) == (
+    assert story.text() == (
         f"DEPLOYED: {LINK} 1/161 released 0 s ago at 50.0 m, not by an order of this supervisor"
     )
 
@@ -180,12 +172,12 @@ def test_each_parachute_that_is_out_has_the_order_that_was_for_it():
     """Given a UPF that launches itself, and a rule that then orders the other one."""
     story = flying(deploy_ladder=(Rung(LINK),)).fly(1.5)
     story.at(story.t, parachute(UPF, "33", deployed=True), parachute())
-    assert text(story).endswith("upf_can 33 released 0 s ago at 50.0 m, " + NOT_OURS)
+    assert story.text().endswith("upf_can 33 released 0 s ago at 50.0 m, " + NOT_OURS)
     story = flying(deploy_ladder=(Rung(LINK),)).fly(1.5)
     story.at(story.t, i.DeployRequest(5, True, "Anna: it burns"))
     story.at(story.t, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
     story.at(story.t, parachute(UPF, "33", deployed=True), parachute(deployed=True))
-    assert text(story) == (
+    assert story.text() == (
         f"DEPLOYED: {LINK} 1/161 released 0 s ago at 50.0 m, by operator, forced: Anna: it burns; "
         f"upf_can 33 released, {NOT_OURS}"
     )
@@ -229,26 +221,26 @@ def test_a_kill_on_the_ground_hides_no_armed_parachute():
     story.at(1.1, i.KillRequest(5, "operator", "Anna: stop"))
     story.at(1.2, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
     assert story.state.stage is Stage.KILLING
-    assert text(story).endswith("; ARMED all the same: upf_can 33 (safety/arm disarms)")
+    assert story.text().endswith("; ARMED all the same: upf_can 33 (safety/arm disarms)")
     # In the air it is no news.
     story = flying()
     story.at(1.1, parachute(UPF, "33", armed=True))
     story.at(1.2, i.KillRequest(5, "operator", "Anna: stop"))
-    assert "ARMED" not in text(story)
+    assert "ARMED" not in story.text()
 
 
 def test_one_of_two_that_is_not_armed_is_named():
     story = on_the_ground(5.0, upf_can=True)
-    assert text(story) == f"ARMED: upf_can 33; NOT armed: {LINK} 1/161"
-    assert text(on_the_ground(5.0, upf_can=True, mavlink_parachute=True)) == "ARMED"
+    assert story.text() == f"ARMED: upf_can 33; NOT armed: {LINK} 1/161"
+    assert on_the_ground(5.0, upf_can=True, mavlink_parachute=True).text() == "ARMED"
 
 
 def test_one_whose_node_is_silent_was_armed_when_it_was_last_received():
     story = on_the_ground(upf_can=True)
     for k in range(1, 60):
         story.at(1.0 + 0.2 * k, story.heartbeat(), i.VehicleReport(STANDING))
-    assert text(story).endswith("; ARMED when it was last received: upf_can 33")
-    assert "all the same" not in text(story)
+    assert story.text().endswith("; ARMED when it was last received: upf_can 33")
+    assert "all the same" not in story.text()
 
 
 def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once():
@@ -258,7 +250,7 @@ def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once():
     failed = story.report(Action.DEPLOY, Outcome.FAILED, detail="denied: three lines of protocol")
     story.at(1.2, story.heartbeat(), failed)
     assert story.state.stage is Stage.FAULT
-    assert text(story) == (
+    assert story.text() == (
         "FAULT: no parachute confirmed that it was released, ordered 0 s ago at 50.0 m by "
         "operator: Anna: it burns"
     )
@@ -269,5 +261,5 @@ def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once():
 @pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
 def test_a_mode_in_which_nobody_is_protected_comes_first(mode):
     story = Story(shipped("multirotor"), mode).flying().fly(1.0)
-    assert text(story).startswith(f"{mode.name}: ")
-    assert text(story).endswith("; IN_FLIGHT: this supervisor guards no vehicle in this mode")
+    assert story.text().startswith(f"{mode.name}: ")
+    assert story.text().endswith("; IN_FLIGHT: this supervisor guards no vehicle in this mode")
