@@ -31,7 +31,7 @@ from bench.kill_switch import (
     started,
 )
 from bench.person import Person
-from bench.process_cost import cpu_time
+from bench.process_cost import cpu_time_of
 from bench.report import COMPARED, compared, load
 from bench.vehicle import NotMeasuredError, deploy, start
 from bench.vehicle_wire import VehicleWire
@@ -96,19 +96,16 @@ def _kills(
                             round_of(peer, ours, how, count * _TURNS)
                     children.check()
                     rest(ours, REST)
-                    before = _took(children, _NODES), _took(onlookers)
+                    who = onlookers.names()
+                    mine, its = cpu_time_of(children, _NODES), cpu_time_of(onlookers, who)
                     rest(ours, _WATCHED_FOR)
-                    mine, its = _took(children, _NODES) - before[0], _took(onlookers) - before[1]
+                    mine = cpu_time_of(children, _NODES) - mine
+                    its = cpu_time_of(onlookers, who) - its
                 sum_mine, sum_its = taken[peer.name]
                 taken[peer.name] = sum_mine + mine, sum_its + its
             print(f"  kills: {turn + 1} of {_TURNS} turns", file=sys.stderr, flush=True)
     whole = _TURNS * _WATCHED_FOR / 100.0
     return peers, {name: (mine / whole, its / whole) for name, (mine, its) in taken.items()}
-
-
-def _took(processes: Processes, names: tuple[str, ...] = ()) -> float:
-    """What they have taken of a core, all if none is named, s."""
-    return sum(cpu_time(processes.pid(one)) for one in names or processes.names())
 
 
 def _deploys(namespace: str, children: Processes, count: int) -> dict[str, list[float]]:

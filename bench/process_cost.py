@@ -18,15 +18,17 @@ def idle_costs(children: Processes, groups: Mapping[str, Iterable[str]]) -> dict
     those = {group: list(names) for group, names in groups.items()}
 
     def taken() -> dict[str, float]:
-        return {
-            group: sum(cpu_time(children.pid(one)) for one in names)
-            for group, names in those.items()
-        }
+        return {group: cpu_time_of(children, names) for group, names in those.items()}
 
     before, began = taken(), time.monotonic()
     time.sleep(WATCHED_FOR)
     passed, after = time.monotonic() - began, taken()
     return {group: 100.0 * (after[group] - before[group]) / passed for group in those}
+
+
+def cpu_time_of(children: Processes, names: Iterable[str]) -> float:
+    """What these children have taken so far, s."""
+    return sum(cpu_time(children.pid(one)) for one in names)
 
 
 def cpu_time(pid: int | str) -> float:

@@ -104,8 +104,8 @@ def _measure(namespace: str, children: Processes, chosen: argparse.Namespace) ->
     return result
 
 
-def start(namespace: str, children: Processes, port: int, mark: str = "") -> None:
-    """Both nodes, whose names among the children end with this mark."""
+def start(namespace: str, children: Processes, port: int) -> None:
+    """Both nodes."""
     limits = f"person stale_after={_STALE_AFTER} lost_after={_LOST_AFTER} regain_after=0.0"
     given = {
         "mavlink_parachute": {"connection": f"udpin:127.0.0.1:{port}"},
@@ -116,7 +116,7 @@ def start(namespace: str, children: Processes, port: int, mark: str = "") -> Non
     }
     for name in NODES:
         arguments = ros_arguments(namespace, **given[name])
-        children.start(f"{name}{mark}", module_of(name), *arguments)
+        children.start(name, module_of(name), *arguments)
 
 
 def _until(what: str, holds: Callable[[], bool], children: Processes) -> None:

@@ -16,7 +16,8 @@ from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import pending_in, renew, slots
 from chute_ros.supervisor.turn import Turn
 
-#: Parachutes whose release is remembered: made-up names must not grow us.
+#: Parachutes of which a release, or that they were armed, is remembered: made-up names must not
+#: grow us.
 MOST_REMEMBERED = 64
 
 
