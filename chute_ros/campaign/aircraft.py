@@ -200,6 +200,9 @@ class Aircraft(Rig):
             self.truth = observe(model, now)
         if self.truth.falls:
             self._check_fall(now)
+        due = self.released + _CARRIES_AFTER
+        if not self.another.falls and now >= due and -model.vertical_speed > _NOT_CARRIED:
+            self.another = observe(model, now)
         self._speed = max(0.0, -model.vertical_speed)
 
     def _check_fall(self, now: float) -> None:
@@ -209,9 +212,6 @@ class Aircraft(Rig):
         if abs(model.height) < _NEAR and model.clearance > _NEAR:
             begin = self.unclear[0]
             self.unclear = (now if math.isnan(begin) else begin, now)
-        due = self.released + _CARRIES_AFTER
-        if not self.another.falls and now >= due and -model.vertical_speed > _NOT_CARRIED:
-            self.another = observe(model, now)
 
     def out(self, whose: str) -> None:
         """A parachute on this link is out."""

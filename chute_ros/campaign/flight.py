@@ -24,8 +24,8 @@ _LOOKS, _FIRST_LOOK = 0.05, 0.5
 #: From its height on, before anything may happen: attitude and landed state have been told, s.
 _SETTLES = 0.3
 #: A flight is followed so long after the last thing that happens to it, and after its release: as
-#: long as anybody would order that again, s.
-_FOLLOWED, _FOLLOWED_RELEASE = 1.5, 2.5
+#: long as anybody would order that again, or the next of several parachutes, s.
+_FOLLOWED, _FOLLOWED_RELEASE, _FOLLOWED_TO_NEXT = 1.5, 2.5, 12.0
 #: A person waits so long for an answer; where no supervisor leads, the next call comes after this,
 #: s.
 _PATIENCE, _AGAIN = 2.0, 0.5
@@ -193,10 +193,10 @@ class Flight:
         if now > rig.landed + (_STANDS if self.scenario.lands else _LIES):
             return True
         if not math.isnan(rig.released) and self._is_carried():
-            return now > max(
-                rig.released + _FOLLOWED_RELEASE, quiet if self.scenario.burn else 0.0
-            )
-        return now > quiet and not rig.truth.falls
+            several = len(self.scenario.carries.supervised("deploy_links")) > 1
+            due = rig.released + (_FOLLOWED_TO_NEXT if several else _FOLLOWED_RELEASE)
+            return now > max(due, quiet if self.scenario.burn else 0.0)
+        return now > quiet and not (rig.truth.falls or rig.another.falls)
 
     def _is_carried(self) -> bool:
         """By the canopy that is out; otherwise it falls on to the ground."""

@@ -63,7 +63,9 @@ still lands it softly. These flights are named with their cause:
   cannot be known.
 
 A canopy that is out and does not carry must be reported, or followed by the next parachute, within
-3 s. A kill alone must open no parachute within 10 m of the height of the take-off."""
+3 s, also where a person deployed it from a good flight. Above one that carries no other may be
+ordered: vehicles with two are followed for 12 s from the release. A kill alone must open no
+parachute within 10 m of the height of the take-off."""
 
 #: Seeds that were looked at, flights, how many of each kind.
 _OF_EACH = """\

@@ -120,6 +120,21 @@ def test_a_canopy_that_does_not_carry_is_followed_by_the_next_parachute() -> Non
     assert judge(end).count is Count.CORRECT
 
 
+def test_it_is_followed_as_well_where_a_person_deployed_before_anything_failed() -> None:
+    deploys = Person("deploy", 1.0)
+    both = {"vehicle": "both", "height": 120.0, "canopy": Canopy(22.0)}
+    end = correct(flown(Failure.NOTHING, person=deploys, **both))
+    assert not end.truth.falls, "it flew well"
+    assert end.another.at < end.released_another < end.another.latest
+
+
+def test_above_a_canopy_that_carries_no_other_parachute_is_released() -> None:
+    """For as long as anybody would release the next of two."""
+    end = correct(flown(Failure.MOTOR, vehicle="both", height=120.0))
+    assert end.landed > end.released + 12.0 or math.isnan(end.landed)
+    assert math.isnan(end.released_another)
+
+
 def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
     end = correct(flown(Failure.MOTOR, height=120.0, canopy=Canopy(22.0)))
     assert end.landing_speed > 15.0
