@@ -189,6 +189,15 @@ def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool
     return still or now >= state.heard.rests_since + RESTS_FOR
 
 
+def rested_at(config: SupervisorConfig, state: State) -> float:
+    """When a multirotor that says so for longer than a fall lasts is down without a person's word,
+    monotonic s; NaN: it does not say so. A wing may glide, and what is ended hang on a canopy."""
+    kinds = airframes_of(state.heard.vehicle.vehicle_type) or (config.profile.vehicle,)
+    if kinds != (Airframe.MULTIROTOR,) or state.stage is not Stage.IN_FLIGHT:
+        return math.nan
+    return state.heard.rests_since + RESTS_FOR
+
+
 def flies_again(state: State, now: float) -> bool:
     """It has flown steadily for so long after its autopilot started anew that it does not fall by
     that any more."""
@@ -271,6 +280,8 @@ def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
     if state.flight.airborne:
         if down is None:
             return True if armed(config, state, now) is Armed.ARMED else None
+        if now >= rested_at(config, state):
+            return False
         if not down or moving(config, state, now):
             return True
         return None if now < landed_at(config, state) else False

@@ -42,7 +42,7 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     if state.stage is Stage.FAULT:
         deadlines.append(state.stage_since + config.deploy_timeout)
     if state.flight.airborne:
-        deadlines.append(flight.landed_at(config, state))
+        deadlines += [flight.landed_at(config, state), flight.rested_at(config, state)]
         if state.stage is Stage.KILLING:
             deadlines.append(flight.down_after_kill_at(config, state))
     deadlines += rule_deadlines(config, state, now)

@@ -4,6 +4,7 @@ wrong with itself, and neither ends a flight that goes well nor releases on the 
 import copy
 import functools
 import math
+from collections.abc import Iterator
 from random import Random
 from typing import Any
 
@@ -749,24 +750,39 @@ def test_a_force_of_which_no_speed_follows_is_denied_in_time_at_each_rate(every)
     assert story.fired() == []
 
 
-@pytest.mark.parametrize("drifts", [-3.0, 3.5])
-def test_a_person_may_reset_one_that_stands_although_its_estimator_drifts(drifts):
-    """Given no barometer, a landing, motors off: no fall lasts for a minute at one speed."""
-    teller = told_to("multirotor")
+def drifts_after_a_landing(profile: str, drift: float) -> Iterator[Teller]:
+    """Given no barometer, a landing, motors off, and an estimator that drifts from then on: the
+    teller, each time that it has told something more."""
+    teller = told_to(profile)
     teller.stand(1.0)
     teller.hover(5.0, 20.0)
     for height in [20.0 - 0.2 * k for k in range(100)]:
         teller.tell(height=height, vertical_speed=-2.0, tilt=3.0, force=9.8)
-    drifting = {"vertical_speed": drifts, "tilt": 1.0, "force": 9.81}
     for k in range(620):
-        teller.tell(**DOWN, **drifting, height=EVERY * drifts * k)
-        if k == 300:
+        drifting = {"vertical_speed": drift, "height": EVERY * drift * k}
+        teller.tell(**DOWN, **drifting, tilt=1.0, force=9.81)
+        yield teller
+
+
+@pytest.mark.parametrize("drift", [-3.0, 3.5])
+def test_a_person_may_reset_one_that_stands_although_its_estimator_drifts(drift):
+    """No fall lasts for a minute at one speed; a wing may glide for longer."""
+    for told, teller in enumerate(drifts_after_a_landing("fixed_wing", drift)):
+        if told == 300:
             teller.story.at(teller.story.t, i.ResetRequest(9))
     assert not teller.story.answer(9).success
     assert "this again after 60 s of that" in teller.story.answer(9).message
     teller.story.at(teller.story.t, i.ResetRequest(10))
     assert teller.story.answer(10).success
     assert not deployed(teller)
+
+
+@pytest.mark.parametrize("drift", [-3.0, 3.5])
+def test_a_multirotor_that_stands_is_down_although_its_estimator_drifts(drift):
+    """Without a person's word: nothing hovers on motors that are off."""
+    stages = [teller.story.state.stage for teller in drifts_after_a_landing("multirotor", drift)]
+    assert set(stages[:590]) == {Stage.IN_FLIGHT}
+    assert stages[-1] in (Stage.BLOCKED, Stage.READY)
 
 
 # -- an attitude that leaps -----------------
