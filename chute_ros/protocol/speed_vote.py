@@ -30,7 +30,7 @@ _Words = deque[tuple[float, float]]
 
 class SpeedVote:
     """Times are monotonic s. outvoted: source -> why; confirmed: those that the barometer agrees
-    with meanwhile."""
+    with meanwhile, or while several do: what one of them told before puts them in no doubt."""
 
     def __init__(self) -> None:
         self._heights: _Words = deque()
@@ -77,7 +77,9 @@ class SpeedVote:
             if now - newest > _OVER_AFTER:
                 del self._against[one]
                 self.outvoted.pop(one, None)
-        self.confirmed = frozenset(right) if self.outvoted else frozenset()
+        agree = [told[one] for one in right]
+        several = len(agree) > 1 and max(agree) - min(agree) < APART
+        self.confirmed = frozenset(right) if self.outvoted or several else frozenset()
 
     def _mean(self, source: str, now: float) -> float | None:
         """Over the time of the barometer's rate."""

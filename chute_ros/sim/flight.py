@@ -120,7 +120,9 @@ class FlightModel:
             # What settles slowly follows the air slowly: a gust is no wind that carries it along.
             gained = (-way.sink - self.vertical_speed) / max(way.settles, dt)
             gained += self.push / max(way.settles, 1.0)
-            self.acceleration = max(0.0, way.force + gained)
+            # Upwards it is carried by what it does not gain downwards, whichever way it leans.
+            leans = math.cos(way.tilt) / max(math.cos(self.roll), math.cos(way.tilt))
+            self.acceleration = way.force * leans * max(0.0, 1.0 + gained / GRAVITY)
         self.vertical_speed += gained * dt
         self.height += self.vertical_speed * dt
         if self.height <= self.ground:

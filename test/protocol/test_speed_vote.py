@@ -110,9 +110,16 @@ def test_one_that_is_right_again_counts_again_after_a_second():
 
     during, _ = told(estimator=errs, odometry=falls, until=5.5)
     assert any("origins" in one for one in during.faults)
-    after, _ = told(estimator=errs, odometry=falls, until=7.5)
+    after, disputed = told(estimator=errs, odometry=falls, until=7.5)
     assert not any("origins" in one for one in after.faults)
     assert after.tilt == 0.0, "the first of the list counts"
+    assert "vertical_speed" not in disputed, "both and the barometer tell the same"
+
+
+def test_two_that_are_near_one_barometer_and_far_from_each_other_are_in_doubt():
+    """Given -9 and -15 m/s beside a barometer that tells -12: none is outvoted."""
+    _, disputed = told(estimator=lambda t: falls(t) + 3.0, odometry=lambda t: falls(t) - 3.0)
+    assert "vertical_speed" in disputed
 
 
 @given(st.integers(0, 10_000), st.floats(-2.0, 2.0))
