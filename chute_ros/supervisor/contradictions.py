@@ -57,9 +57,9 @@ _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
 #: As fast as commanded: nearer than this, m/s. So nearly the last command of an autopilot that is
 #: silent counts, by its speed, and by the heights.
 _SINKS_ON, _SINKS_ON_BY_HEIGHTS = 1.0, 2.0
-#: In place of a measurement: that a wing sinks as its commanded attitude makes it. It leans by
-#: this at least, degrees: what falls flat does not.
-DIVE, _DIVES = "dive", 15.0
+#: In place of a measurement: that a wing sinks as its commanded attitude makes it. That leans by
+#: this at least, degrees: of what falls flat it does not.
+DIVE, _DIVES = "dive", 10.0
 #: Carried in full: on the average between these, m/s^2, for so long, s, each so near to gravity,
 #: m/s^2, as motors shake.
 _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
@@ -150,7 +150,7 @@ def commanded(
     told = {}
     if attitude_error <= _FOLLOWS:
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
-        if tilt >= _DIVES:
+        if tilt - attitude_error >= _DIVES:
             told[DIVE] = f"it dives as commanded ({tilt:.0f} degrees, to {attitude_error:.0f})"
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
@@ -214,14 +214,22 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
 
 def felt_drop(motion: tuple[Moment, ...]) -> float:
     """The vertical speed that a fall has given it lately, as its accelerometer felt it, m/s: 0, or
-    negative; over a silence by how much its speed is lower after it; NaN: no speed was told there.
-    Whichever way up it is: no attitude is asked."""
-    silent = [
-        min(after[1] - before[1], 0.0)
+    negative; over a silence by how much more its speed is lower after it than the forces around it
+    make it; NaN: no speed was told there. Whichever way up it is: no attitude is asked."""
+    return _felt(motion) + sum(
+        min(_unfelt_change(before, after), 0.0)
         for before, after in pairwise(motion)
         if after[0] - before[0] > _GAP
-    ]
-    return _felt(motion) + sum(silent)
+    )
+
+
+def _unfelt_change(before: Moment, after: Moment) -> float:
+    """Of the vertical speed from one moment to another one, m/s: all of it beside a force as in a
+    fall; otherwise what the least force explains is no fall."""
+    change, force = after[1] - before[1], min(before[2], after[2])
+    if not FREE_FALL <= force <= GRAVITY:
+        return change
+    return change + (GRAVITY - force) * (after[0] - before[0])
 
 
 def _felt(motion: tuple[Moment, ...]) -> float:

@@ -288,11 +288,19 @@ def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
     if down is not None:
         off = armed(config, state, now) is Armed.DISARMED
         # One that has not flown and whose motors are off does not fly, whatever drifts.
-        return (not down and not off) or _falls_against_its_word(config, state, down and off, now)
+        flies = not down and (not off or _rises_on_what_is_off(config, state, now))
+        return flies or _falls_against_its_word(config, state, down and off, now)
     height = measured(config, state, "height", now)
     if armed(config, state, now) is Armed.ARMED and not math.isnan(height):
         return height - state.flight.armed_height > config.takeoff_height
     return None
+
+
+def _rises_on_what_is_off(config: SupervisorConfig, state: State, now: float) -> bool:
+    """A rocket whose motor has no valve, or has burnt out, as it was first heard."""
+    height = measured(config, state, HEIGHT, now) - state.flight.armed_height
+    high = height > config.takeoff_height and bool(moving(config, state, now))
+    return config.profile.vehicle is Airframe.ROCKET and high
 
 
 def _falls_against_its_word(

@@ -44,6 +44,9 @@ PARTS = {"tilt_deg": "attitude"}
 #: A barometer that rises by so much faster than in the rest of the second, m/s, steps up: its
 #: noise is some decimetres in a tenth of a second.
 _STEP_UP = 10.0
+#: A height that is the same to the last bit so shortly after, s, is no other sample: barometers
+#: that are read more often than they measure (at 4 Hz and more).
+_TOLD_AGAIN = 0.3
 #: A speed that is the same to the last bit for so long stands, s: ten samples of one that lives.
 _STANDS = 1.0
 #: What a barometer told longer ago says nothing of a fall, s.
@@ -250,8 +253,19 @@ def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> 
     return _rate(heights)
 
 
+def _samples(heights: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Without what is the same to the last bit as one before it of a moment ago: it was told more
+    often than measured."""
+    kept = [heights[0]]
+    for one in heights[1:]:
+        if one[1] != kept[-1][1] or one[0] - kept[-1][0] > _TOLD_AGAIN:
+            kept.append(one)
+    return tuple(kept) if len(kept) > 1 else heights
+
+
 @lru_cache(maxsize=16)  # as _rate
 def _rise(heights: tuple[tuple[float, float], ...]) -> Rise:
+    heights = _samples(heights)
     rates, since, until = _rates(heights), heights[0][0], heights[-1][0]
     usual = median(rates)
     # As the propellers stop, a barometer in their wash tells some metres more within a moment.
@@ -265,6 +279,7 @@ def _rise(heights: tuple[tuple[float, float], ...]) -> Rise:
 @lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times
 def _rate(heights: tuple[tuple[float, float], ...]) -> float:
     """What heights (monotonic s, m) tell of a climb, m/s."""
+    heights = _samples(heights)
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rate = median(_rates(heights))
     # The noise of neighbours has a middle one as well; over the whole second it is small, where a

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from story import DOWN, LINK, STANDING, START, Story, falling, parachute, shipped
 
-from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.model import Action, Armed, LandedState, Outcome, ParachuteState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung
 from chute_ros.supervisor.machine import Stage
@@ -133,6 +133,44 @@ def test_a_rocket_whose_launch_nobody_recognised_and_that_tells_no_speed_is_seen
     height, speed = released[0]
     assert speed < -20.0, "not on its way up"
     assert height > 150.0
+
+
+@pytest.mark.parametrize("felt", [None, 6.0])
+def test_a_rocket_whose_motor_has_no_valve_flies_by_its_height(felt):
+    """Given IN_AIR beside motors that are off, and an accelerometer that failed in the boost, or
+    turns with the rocket and feels that."""
+    story = Story(shipped("rocket")).ready()
+    told = {"armed": Armed.DISARMED, "tilt": math.nan, "battery_remaining": math.nan}
+    story.fly(3.0, 0.1, **told, landed_state=GROUND, height=0.0)
+    for height, speed, force in boosted(2.0):
+        moves = {"height": height, "vertical_speed": speed}
+        feels = force if felt is None else max(felt, force)
+        story.fly(story.t + 0.1, 0.1, **told, **moves, acceleration=feels)
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(("sink", "height", "warned"), [(42.0, 2800.0, 1), (38.0, 2800.0, 0)])
+@pytest.mark.parametrize("deployed", [True, False])
+def test_a_drogue_that_hardly_brakes_is_told_while_there_is_time(sink, height, warned, deployed):
+    story = Story(shipped("rocket")).ready().fly(1.0)
+    said = parachute(deployed=deployed, state=ParachuteState.LAUNCHED)
+    for _ in range(80):
+        height -= 0.1 * sink
+        flies = story.told(height=height, vertical_speed=-sink, tilt=math.nan)
+        story.at(story.t + 0.1, story.heartbeat(), said, flies)
+    warning = "rule 'falls fast under its drogue'"
+    assert sum(warning in text for text in story.alarms()) == warned
+    assert "DEPLOY" not in story.fired()
+
+
+def test_ten_kilometres_up_a_drogue_that_works_may_be_faster():
+    story = Story(shipped("rocket")).ready().fly(1.0)
+    height, said = 14_000.0, parachute(deployed=True, state=ParachuteState.LAUNCHED)
+    while height > 10_500.0:
+        height -= 7.0
+        flies = story.told(height=height, vertical_speed=-70.0, tilt=math.nan)
+        story.at(story.t + 0.1, story.heartbeat(), said, flies)
+    assert "DEPLOY" not in story.fired()
 
 
 ANEW = {"reboot_count": 1, "rebooted_in_flight": True, "height": 0.0}

@@ -175,7 +175,6 @@ DEPLOYS = [
     *falls("fixed_wing", "autopilot lost and falling", 1.0, LOST, **DIVES),
     *falls("fixed_wing", "autopilot rebooted in flight", 1.0, REBOOTED, **DIVES),
     *falls("fixed_wing", "autopilot terminates", 0.5, {"system_status": 8}, **DIVES),
-    empty("fixed_wing", sink=10.0, hold=1.0),
     Case(
         *("rocket", "critical sink", {"vertical_speed": -30.1}, {"vertical_speed": -30.0}, 2.0, 5),
         speeds_up=0.25,
@@ -288,6 +287,7 @@ def test_every_rule_has_its_story(name):
     told |= {"fall that its estimator does not tell", "off its command", "falls flat"}
     told |= {"spin that its estimator does not tell", "main overdue", "main late"}
     told |= {"sink that its estimator does not tell", "sinks on", "no canopy reported"}
+    told |= {"falls fast under its drogue"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -692,3 +692,43 @@ def test_sticks_that_are_reversed_in_a_descent_end_no_flight_of_an_aeroplane():
     story.fly(story.t + 1.0, 0.05, vertical_speed=speed, attitude_error=0.0, tilt=60.0)
     assert far == 10, "for 0.5 s, and without force for most of it"
     assert story.fired() == []
+
+
+@pytest.mark.parametrize(
+    ("rule", "told", "for_s"),
+    [
+        ("sinks fast", {"vertical_speed": -7.2}, 1.0),
+        ("battery dead", {"battery_remaining": 0.02}, 11.0),
+    ],
+)
+def test_by_hand_who_alone_decides_is_warned(rule, told, for_s):
+    story = Story(shipped("by_hand")).ready().fly(2.0)
+    story.fly(2.0 + for_s, **told)
+    assert alarms(story, rule) == 1
+    assert story.fired() == []
+
+
+def test_by_hand_a_silent_autopilot_is_told():
+    story = Story(shipped("by_hand")).ready().fly(1.0)
+    story.at(4.1)
+    assert alarms(story, "autopilot lost") == 1
+
+
+#: Vertical speed, force and tilt of an aeroplane of 30 m/s that is pushed over to 18 degrees.
+PUSHED_OVER = (
+    *((-0.2, 6.8, 0), (-0.6, 4.7, 2), (-1.2, 3.1, 4), (-1.9, 2.0, 6), (-2.8, 1.2, 8)),
+    *((-3.6, 0.9, 10), (-4.5, 1.2, 11), (-5.3, 1.8, 13), (-6.0, 2.5, 14), (-6.7, 3.3, 14)),
+    *((-7.3, 4.0, 15), (-7.7, 4.8, 16), (-8.2, 5.4, 16), (-8.5, 6.0, 16), (-8.8, 6.5, 17)),
+    *((-9.1, 6.9, 17), (-9.3, 7.6, 18), (-9.3, 8.3, 18), (-9.3, 8.8, 18), (-9.3, 8.9, 18)),
+)
+
+
+@pytest.mark.parametrize(("commanded", "fires"), [(18.0, []), (0.0, ["KILL", "DEPLOY"])])
+def test_a_fast_wing_that_is_pushed_over_as_commanded_does_not_fall_flat(commanded, fires):
+    story, height = Story(shipped("fixed_wing")).ready().fly(2.0, height=120.0), 120.0
+    for speed, force, tilt in PUSHED_OVER:
+        height += 0.1 * speed
+        told = {"vertical_speed": speed, "acceleration": force, "tilt": float(tilt)}
+        error = max(2.0, tilt - commanded)
+        story.fly(story.t + 0.1, 0.1, height=height, attitude_error=error, **told)
+    assert story.fired() == fires

@@ -205,6 +205,9 @@ def test_a_drop_is_felt_whether_it_was_told_as_well_or_not():
     gap = (*fell[:5], *fell[9:])
     assert felt_drop(gap) == pytest.approx(-GRAVITY, abs=0.2)
     assert felt_drop((*MOMENTS[:5], *MOMENTS[9:])) > -7.0, "which hovers on"
+    # What the force around a gap explains is no fall: a descent that is begun with 1.5 m/s^2.
+    begun = tuple((0.4 * k, -0.6 * k, GRAVITY - 1.5, 1.0) for k in range(8))
+    assert felt_drop(begun) == pytest.approx(0.0, abs=0.1)
     assert math.isnan(felt_drop(tuple((t, math.nan, f, c) for t, _, f, c in gap)))
     assert felt_drop(()) == 0.0
 

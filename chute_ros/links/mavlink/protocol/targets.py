@@ -19,6 +19,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.firmware import Firmware, firmware_of
@@ -32,6 +34,9 @@ Vector = tuple[float, float, float]
 ATTITUDE_TARGET_SILENCE, TARGET_SILENCE = 0.5, 1.0
 #: What a quaternion's length may differ from 1.
 _LENGTH_TOLERANCE = 0.01
+#: Height targets of so long, s, of which they must span this, s, tell how fast the target comes
+#: down, m/s, from this on: terrain, a glide slope. One step, as to the next way point, does not.
+_TARGETS_OVER, _TARGETS_SPAN, _COMES_DOWN = 1.5, 0.8, 1.0
 #: The newest attitude target may be so much older than the newest attitude, s: it comes at 10 Hz.
 _BEHIND = 0.15
 #: A target's own time may be so much behind the autopilot's newest one, ms.
@@ -51,6 +56,19 @@ _MULTIROTORS = frozenset(
         dialect.MAV_TYPE_GENERIC_MULTIROTOR,
     }
 )
+#: With two motors, with four, of which nobody tells more (today's names of the first two and of
+#: VTOL_RESERVED3 are VTOL_TAILSITTER_DUOROTOR, VTOL_TAILSITTER_QUADROTOR, VTOL_TAILSITTER).
+_TAIL_SITTERS = frozenset(
+    {
+        dialect.MAV_TYPE_VTOL_DUOROTOR,
+        dialect.MAV_TYPE_VTOL_QUADROTOR,
+        dialect.MAV_TYPE_VTOL_RESERVED3,
+    }
+)
+#: ArduPlane's modes in which the attitude of NAV_CONTROLLER_OUTPUT is that of its command: CIRCLE,
+#: FBWA, FBWB, CRUISE, AUTOTUNE, AUTO, RTL, LOITER, TAKEOFF, AVOID_ADSB, GUIDED, THERMAL,
+#: LOITER_ALT_QLAND. In STABILIZE and TRAINING it is level whatever the sticks do, in ACRO its own.
+_ATTITUDE_COMMANDED = frozenset({1, *range(5, 9), *range(10, 16), 24, 25})
 #: ArduPlane's modes in which its height error is that of the wing: CIRCLE, FBWB, CRUISE, AUTO,
 #: RTL, LOITER, TAKEOFF, AVOID_ADSB, GUIDED; and of the lift motors: QLOITER, QLAND.
 _ON_THE_WING = frozenset({1, 6, 7, 10, 11, 12, 13, 14, 15})
@@ -125,6 +143,8 @@ class Targets:
         self._axis_at = -math.inf
         #: The vehicle's own, lately, with the time, oldest first.
         self._own: deque[tuple[float, Vector]] = deque()
+        #: The commanded height, lately, with the time, oldest first; of one message each time.
+        self._heights: deque[tuple[float, float]] = deque()
 
     def attitude_target(self, message: Any, newest_ms: int | None, now: float) -> None:
         """ATTITUDE_TARGET; newest_ms: the autopilot's newest time_boot_ms, None: not known."""
@@ -137,6 +157,12 @@ class Targets:
         upward = self.vehicle.kind in _MULTIROTORS or self._vtol_state(now) == _ON_LIFT_MOTORS
         lifts = full and upward and axis[2] >= math.cos(_UPRIGHT)
         self._take("full_thrust", message.thrust, not lifts, now)
+
+    def lies_on_its_wing(self, now: float) -> bool:
+        """A tail-sitter of PX4 does, or is on the way: it goes on to tell the attitude of its hover,
+        which is 90 degrees from upright then (its FailureDetector turns it)."""
+        tail_sitter = self.vehicle.px4 and self.vehicle.kind in _TAIL_SITTERS
+        return tail_sitter and self._vtol_state(now) != _ON_LIFT_MOTORS
 
     def attitude(self, axis: Vector, now: float) -> None:
         """The vehicle's vertical axis is this one now (see vertical_axis)."""
@@ -159,6 +185,7 @@ class Targets:
         mask = message.type_mask
         self._take("target_speed_local", -message.vz, mask & _VZ_IGNORED, now)
         self._take("target_above_origin", -message.z, mask & _Z_IGNORED, now)
+        self._note_height(-message.z, mask & _Z_IGNORED, now)
 
     def position_target_global_int(self, message: Any, now: float) -> None:
         """POSITION_TARGET_GLOBAL_INT: height by its frame."""
@@ -169,6 +196,7 @@ class Targets:
         self._take("target_speed_global", -message.vz, mask & _VZ_IGNORED, now)
         self._take("target_altitude", message.alt, ignored or frame not in _ABOVE_SEA, now)
         self._take("target_height", message.alt, ignored or frame not in _ABOVE_HOME, now)
+        self._note_height(message.alt, ignored, now)
 
     def nav_controller_output(self, message: Any, now: float) -> None:
         """NAV_CONTROLLER_OUTPUT: alt_error is the target less the height, m; on the wing nav_roll
@@ -178,11 +206,15 @@ class Targets:
             return
         yaw = self._readings.fresh("yaw", ATTITUDE_TARGET_SILENCE, now)
         angles = (math.radians(message.nav_roll), math.radians(message.nav_pitch), yaw)
-        state = self._vtol_state(now)
-        if state in _WINGBORNE and all(map(math.isfinite, angles)):
+        state, mode = self._vtol_state(now), self.vehicle.custom_mode
+        commanded = state in _WINGBORNE and mode in _ATTITUDE_COMMANDED
+        if commanded and all(map(math.isfinite, angles)):
             self._axis, self._axis_at = vertical_axis(*angles), now
         modes = _HEIGHT_HELD.get(state, frozenset())
-        self._take("height_error", message.alt_error, self.vehicle.custom_mode not in modes, now)
+        self._take("height_error", message.alt_error, mode not in modes, now)
+        climbed = self._readings.value("vertical_speed") * self._readings.age("altitude", now)
+        height = self._fresh("altitude", now) + climbed + message.alt_error
+        self._note_height(height, mode not in modes, now)
 
     def at(self, now: float) -> tuple[float, float, float]:
         """Commanded vertical speed (m/s, up positive), and how far below its target the vehicle is
@@ -192,7 +224,29 @@ class Targets:
             speed = self._fresh("target_speed_global", now)
         if math.isnan(speed) and not math.isnan(self._fresh("full_thrust", now)):
             speed = 0.0
-        return speed, self._below(now), self._readings.age("target", now)
+        below = self._below(now)
+        if math.isnan(speed) and below > 0.0:
+            speed = self._comes_down(now)
+        return speed, below, self._readings.age("target", now)
+
+    def _note_height(self, height: float, ignored: object, now: float) -> None:
+        """Of a height target that is commanded now, m above whatever its message counts from."""
+        if ignored or not math.isfinite(height):
+            self._heights.clear()
+            return
+        self._heights.append((now, height))
+        while now - self._heights[0][0] > _TARGETS_OVER:
+            self._heights.popleft()
+
+    def _comes_down(self, now: float) -> float:
+        """The vertical speed of a height target that comes down, m/s; NaN: it does not, as far as
+        anybody knows."""
+        told = [one for one in self._heights if now - one[0] <= _TARGETS_OVER]
+        if len(told) < 2 or told[-1][0] - told[0][0] < _TARGETS_SPAN:
+            return math.nan
+        rates = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(told) if b[0] > a[0]]
+        rate = median(rates)
+        return rate if rate <= -_COMES_DOWN else math.nan
 
     def _take(self, part: str, value: float, ignored: object, now: float) -> None:
         """A target; one that is not commanded any more is not known at once."""

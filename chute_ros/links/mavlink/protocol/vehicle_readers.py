@@ -102,6 +102,8 @@ class VehicleReaders:
         self._turned(*angles_of(w / length, x / length, y / length, z / length), now)
 
     def _turned(self, roll: float, pitch: float, yaw: float, now: float) -> None:
+        if self.targets.lies_on_its_wing(now):
+            return
         self._readings.set("roll", roll, now)
         self._readings.set("pitch", pitch, now)
         self._readings.set("yaw", yaw, now)

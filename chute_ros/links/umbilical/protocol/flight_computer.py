@@ -6,7 +6,9 @@ Source: Umbilical Reference, sections 1 and 3.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable
+from statistics import fmean
 
 from chute_ros.links.umbilical.protocol.canopies import CANOPIES, Canopies
 from chute_ros.links.umbilical.protocol.gate import Situation
@@ -31,7 +33,16 @@ DEVICE = "flight_computer"
 #: It has landed when its altitude stays within so many metres for so many seconds after a
 #: deployment: the slowest canopy falls several times as fast.
 _REST_HEIGHT, _REST_TIME = 3.0, 5.0
-_REST_SPEED = 1.0  # m/s
+#: Speeds of so long, s, are that of one that moves by their mean beyond this, m/s, unless they have
+#: been the same to the last bit for as long: satellites that are not heard any more.
+_SPEEDS_OVER, _REST_SPEED = 3.0, 1.0
+#: A barometer whose pressure has been the same to the last bit for so long, s, tells no height that
+#: changes: one that counts on from its last value sinks by what it takes from it each turn.
+_PRESSURE_STANDS = 0.6
+#: It stands, whatever its mode, if so long, s, it has stayed where it is and feels its weight to
+#: this, m/s^2, and its barometer has lived within this, s.
+_STANDS_AFTER, _ITS_WEIGHT, _LIVES_WITHIN = 10.0, 2.0, 2.0
+_GRAVITY = 9.81
 #: A clock that falls behind ours by more, from one record to the next, may have started anew, s.
 _FALLS_BEHIND = 0.5
 #: So many records in a row must say that a canopy is out which nobody fired from here: text
@@ -65,6 +76,12 @@ class FlightComputerTracker:
         self.flying = False
         self._rest_altitude = NAN
         self._rest_since = NAN
+        #: Its downward speeds of the last seconds, with their times; m/s.
+        self._speeds: deque[tuple[float, float]] = deque()
+        #: Since when its pressure is the same to the last bit, in so many records, and what its
+        #: altitude was then, m.
+        self._pressure_since = self._pressure_altitude = NAN
+        self._pressure_told = 0
         #: Its altitude where it stands before the flight, m: it may count from the sea. NaN: it
         #: was not heard there.
         self._ground = NAN
@@ -116,6 +133,10 @@ class FlightComputerTracker:
         if before is None or before["ms_since_boot_cfc"] != record["ms_since_boot_cfc"]:
             self._clock_moved_at = now
         self.records += 1
+        if before is None or before["pressure"] != record["pressure"]:
+            self._pressure_since, self._pressure_altitude = now, record.number("altitude")
+            self._pressure_told = 0
+        self._pressure_told += 1
         # The first one tells what happened before it was heard.
         row = self._out_in_a_row + 1 if before is not None else _TO_BELIEVE
         self._out_in_a_row = row if self._says_out(self._counting) else 0
@@ -269,8 +290,7 @@ class FlightComputerTracker:
         if record is None:
             return VehicleState()
         age = now - record.received
-        axes = [record.number(f"accel_{axis}") for axis in "xyz"]
-        acceleration = math.sqrt(sum(a * a for a in axes))
+        acceleration = _force(record)
         has_fix = record.number("fix_type") >= _FIX_3D
         speed = -record.number("vel_d") if has_fix else NAN
         height = self._height(record)
@@ -301,6 +321,10 @@ class FlightComputerTracker:
     def _height(self, record: Record) -> float:
         """Above where it took off, m; of one that was first heard in flight its altitude. NaN: not
         known."""
+        stood = record.received - self._pressure_since
+        stands = self._pressure_told > 2 and stood > _PRESSURE_STANDS
+        if stands and record.number("altitude") != self._pressure_altitude:
+            return NAN
         if not math.isnan(self._pressure_zero):
             return _by_pressure(record) - self._pressure_zero
         return record.number("altitude") - (0.0 if math.isnan(self._ground) else self._ground)
@@ -323,16 +347,33 @@ class FlightComputerTracker:
         came_out = self._was_out and not was_out
         took_off = self.mode in IN_FLIGHT and (before is None or _mode(before) not in IN_FLIGHT)
         # A barometer that is stuck is no rest where the satellites tell of a fall.
-        moves = record.number("fix_type") >= _FIX_3D and abs(record.number("vel_d")) > _REST_SPEED
+        moves = self._moves_by_satellites(record, now)
         stays = abs(altitude - self._rest_altitude) <= _REST_HEIGHT
         if came_out or took_off or moves or not stays:
             self._rest_altitude, self._rest_since = altitude, now
 
+    def _moves_by_satellites(self, record: Record, now: float) -> bool:
+        speed = record.number("vel_d") if record.number("fix_type") >= _FIX_3D else NAN
+        if math.isnan(speed):
+            self._speeds.clear()
+            return False
+        self._speeds.append((now, speed))
+        while now - self._speeds[0][0] > _SPEEDS_OVER:
+            self._speeds.popleft()
+        speeds = [one for _, one in self._speeds]
+        frozen = len(set(speeds)) == 1 and now - self._speeds[0][0] > _SPEEDS_OVER / 2.0
+        ignored = frozen and self._pressure_lives(record)
+        return not ignored and abs(fmean(speeds)) > _REST_SPEED
+
+    def _pressure_lives(self, record: Record) -> bool:
+        return record.received - self._pressure_since <= _LIVES_WITHIN
+
     def _watch_flight(self) -> None:
         """Whether it flies: a ground mode after a restart in the air, and a mode without a name or
-        a fault, say nothing of it until its altitude stays."""
+        a fault, say nothing of it until its altitude stays. A mode of the flight says so until it
+        is seen to stand: the motor did not burn, or it came down without a canopy."""
         if self.mode in IN_FLIGHT:
-            flies = not self.landed
+            flies = not self.landed and not self._stands
             if flies and not self.flying:
                 self.restarted_in_flight = False  # what happened in another flight
             self.flying = flies
@@ -343,6 +384,12 @@ class FlightComputerTracker:
     def _at_rest(self) -> bool:
         """Its altitude has not changed for a while, by its records: silence is no rest."""
         return self.record is not None and self.record.received - self._rest_since >= _REST_TIME
+
+    @property
+    def _stands(self) -> bool:
+        if self.record is None or not self.record.received - self._rest_since >= _STANDS_AFTER:
+            return False
+        return self._pressure_lives(self.record) and abs(_force(self.record) - _GRAVITY) <= _ITS_WEIGHT
 
     def _motors(self) -> Armed:
         """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
@@ -357,7 +404,7 @@ class FlightComputerTracker:
     def _landed_state(self) -> LandedState:
         if self.flying:
             return LandedState.IN_AIR
-        if self.mode in GROUND or self.landed:
+        if self.mode in GROUND or self.landed or self._stands:
             return LandedState.ON_GROUND
         return LandedState.UNKNOWN
 
@@ -376,6 +423,11 @@ class FlightComputerTracker:
             faults.append("flight mode Fault")
         elif self.mode is None:
             faults.append(f"flight mode {self.record['flight_mode']} has no name")
+        elif self.mode in IN_FLIGHT and not self.flying and not self.landed:
+            faults.append(
+                f"flight mode {self.mode.name.capitalize()} while it stands: it did not fly, or came "
+                "down without a canopy; stay away, its charges may be live"
+            )
         for name in ("altitude", "pressure"):
             if not math.isfinite(self.record.number(name)):
                 faults.append(f"{name} is {self.record.number(name)}")
@@ -401,6 +453,11 @@ class FlightComputerTracker:
 
 def _mode(record: Record) -> FlightMode | None:
     return _MODES.get(int(record["flight_mode"]))
+
+
+def _force(record: Record) -> float:
+    """Length of the specific force, m/s^2."""
+    return math.sqrt(sum(record.number(f"accel_{axis}") ** 2 for axis in "xyz"))
 
 
 def _by_pressure(record: Record) -> float:

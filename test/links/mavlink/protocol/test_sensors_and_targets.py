@@ -375,6 +375,56 @@ def test_height_error_of_an_aeroplane_in_modes_that_hold_height():
         assert told(plane(mode), ON_LIFT_MOTORS, off_by(3.0)).below_target == 3.0, mode
 
 
+def followed(target, height, until=4.0):
+    """What is known of an aeroplane in AUTO at the end, which tells 5 times a second its height at
+    t and how far it is below its target."""
+    heard = Told().hear(plane(10), vtol(0))
+    for k in range(round(until * 5.0) + 1):
+        t = k / 5.0
+        heard.hear(plane(10), vtol(0), at_altitude(height(t)), now=t)
+        heard.hear(off_by(target(t) - height(t)), now=t + 0.05)
+    return heard.at(until + 0.05)
+
+
+def test_a_height_target_that_comes_down_is_a_commanded_sink():
+    """Terrain, a glide slope: it is 3 m below it, and sinks as it does."""
+    slope = followed(lambda t: 503.0 - 6.0 * t, lambda t: 500.0 - 6.0 * t)
+    assert slope.target_vertical_speed == pytest.approx(-6.0, abs=0.1)
+    assert slope.below_target == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    "target",
+    [lambda t: 503.0, lambda t: 540.0 if t < 3.0 else 503.0, lambda t: 503.0 + 2.0 * t],
+    ids=["stands", "is that of the next way point", "climbs"],
+)
+def test_one_that_sinks_below_a_target_that_does_not_was_not_commanded_to(target):
+    falls = followed(target, lambda t: 500.0 - 8.0 * t)
+    assert math.isnan(falls.target_vertical_speed)
+    assert falls.below_target > 30.0
+
+
+def test_in_modes_whose_message_tells_no_command_nothing_of_it_is_known():
+    """STABILIZE and TRAINING tell level whatever the sticks do, ACRO the own attitude."""
+    for mode, commanded in [(2, False), (3, False), (4, False), (5, True), (12, True)]:
+        level = Told().hear(plane(mode), ON_WING, attitude(), nav_pitch(0.0), attitude())
+        assert math.isnan(level.at().attitude_error) is not commanded, mode
+
+
+def test_a_tail_sitter_of_px4_tells_its_attitude_in_a_hover_alone():
+    """On its wing that of the hover goes on, 90 degrees from upright: it is not known there."""
+    px4 = vehicle(d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_VTOL_QUADROTOR)
+    upright, lies = attitude(1000, pitch=-0.1), attitude(1100, pitch=-1.5)
+    heard = Told().hear(px4, ON_LIFT_MOTORS, upright)
+    assert heard.at().tilt == pytest.approx(0.1)
+    for state in (vtol(d.MAV_VTOL_STATE_TRANSITION_TO_FW), ON_WING):
+        heard.hear(state, lies, now=0.6)
+        assert heard.at(0.6).tilt == pytest.approx(0.1), "as it was"
+        assert heard.at(0.6).attitude_age == pytest.approx(0.6)
+    ardupilot = vehicle(d.MAV_AUTOPILOT_ARDUPILOTMEGA, d.MAV_TYPE_VTOL_QUADROTOR)
+    assert told(ardupilot, ON_WING, lies).tilt == pytest.approx(1.5), "it turns its view itself"
+
+
 #: Who, and on what it flies.
 NO_HEIGHT_ERROR = {
     "of a mode that may be old": [

@@ -189,3 +189,57 @@ def test_a_record_of_before_the_cable_was_pulled_is_not_fresh():
     assert rocket.computer.situation(0.5) is Situation.UNKNOWN
     rocket.says(0.6, STANDBY)
     assert rocket.computer.situation(0.6) is Situation.STANDBY
+
+
+def test_an_altitude_that_counts_on_beside_a_pressure_that_stands_is_none():
+    """Given a barometer that is lost under way: each turn takes the site's altitude once more."""
+    rocket = Rocket()
+    rocket.descends(0.0, 2.0, mode=STANDBY, height=0.0, speed=0.0)
+    rocket.descends(2.1, 5.0, mode=ASCENT, height=0.0, speed=-150.0)
+    lost = {"pressure": "92000.5", "fix_type": "0"}
+    for step in range(10):
+        rocket.says(7.2 + step / 10, FAULT, altitude=str(750.0 - 10.0 * step), **lost)
+    assert math.isnan(vehicle(rocket, 8.1).height)
+    rocket.says(8.2, FAULT, altitude="900", pressure="91000", fix_type="0")
+    assert vehicle(rocket, 8.2).height == pytest.approx(900.0, abs=1.0), "it is back"
+
+
+RESTING = {"accel_x": "0.1", "accel_y": "0.2", "accel_z": "9.8"}
+
+
+def stands(rocket, start, seconds, mode, **texts):
+    """With the noise of a barometer; the time of its last record."""
+    at = start
+    for step in range(round(seconds * 10) + 1):
+        at = start + step / 10
+        rocket.says(at, mode, altitude=f"{0.3 * (step % 3):.3f}", **{**RESTING, **texts})
+    return at
+
+
+@pytest.mark.parametrize("mode", [ASCENT, COAST])
+def test_a_launch_that_did_not_leave_the_pad_is_no_flight_and_is_told(mode):
+    rocket = Rocket()
+    stands(rocket, 0.0, 3.0, STANDBY)
+    now = stands(rocket, 3.1, 9.0, mode)
+    assert vehicle(rocket, now).landed_state is LandedState.IN_AIR, "the motor may burn late"
+    now = stands(rocket, now + 0.1, 3.0, mode)
+    assert vehicle(rocket, now).landed_state is LandedState.ON_GROUND
+    told = status(rocket, now)
+    assert told.state is ParachuteState.ABNORMAL
+    assert "while it stands" in " ".join(told.faults)
+    # When it burns after all, then it flies.
+    rocket.descends(now + 0.1, 1.0, mode=mode, height=5.0, speed=-50.0)
+    assert vehicle(rocket, now + 1.1).landed_state is LandedState.IN_AIR
+    assert status(rocket, now + 1.1).faults == ()
+
+
+@pytest.mark.parametrize("speed", [lambda step: 22.0, lambda step: (-1.4, 0.2, 1.3)[step % 3]])
+def test_satellites_that_froze_or_wander_hide_no_landing(speed):
+    rocket = Rocket()
+    rocket.descends(0.0, 3.0, mode=ASCENT, height=0.0, speed=-100.0)
+    rocket.descends(3.1, 5.0, height=60.0, speed=12.0)
+    for step in range(90):
+        height = f"{0.3 * (step % 3):.3f}"
+        texts = {**RESTING, "vel_d": str(speed(step // 10)), "ssa_drogue_deployed": "1"}
+        rocket.says(8.2 + step / 10, DROGUE, altitude=height, **texts)
+    assert vehicle(rocket, 17.1).landed_state is LandedState.ON_GROUND

@@ -1,5 +1,7 @@
 """A flight computer that speaks record by record, for the stories of its picture."""
 
+import math
+
 from umbilical_lines import record
 
 from chute_ros.links.umbilical.protocol.flight_computer import FlightComputerTracker
@@ -8,6 +10,7 @@ from chute_ros.protocol.liveness import LivenessLimits
 STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
 LIMITS = LivenessLimits(3.0, 15.0)
 ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
+SEA_LEVEL = 101_325.0  # Pa
 
 
 class Rocket:
@@ -18,7 +21,11 @@ class Rocket:
         self.started = -100.0
 
     def says(self, at, mode, **texts):
-        """A record; what changed of the link, and what its clock says."""
+        """A record; what changed of the link, and what its clock says. Of an altitude that is named
+        the pressure is that of the standard atmosphere."""
+        altitude = float(texts.get("altitude", "nan"))
+        if math.isfinite(altitude) and "pressure" not in texts:
+            texts["pressure"] = f"{SEA_LEVEL * (1.0 - altitude / 44_330.8) ** 5.256:.3f}"
         clock = {"ms_since_boot_cfc": str(round((at - self.started) * 1000))}
         texts = {**ON_PAD, **clock, "flight_mode": str(mode), **texts}
         came = self.computer.heard(record(at, **texts), at)
