@@ -149,11 +149,18 @@ def test_a_rocket_whose_motor_has_no_valve_flies_by_its_height(felt):
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
+def launched(deployed: bool) -> i.ParachuteReport:
+    """Its drogue is out."""
+    told = parachute(deployed=deployed)
+    return replace(told, status=replace(told.status, state=ParachuteState.LAUNCHED))
+
+
 @pytest.mark.parametrize(("sink", "height", "warned"), [(42.0, 2800.0, 1), (38.0, 2800.0, 0)])
 @pytest.mark.parametrize("deployed", [True, False])
 def test_a_drogue_that_hardly_brakes_is_told_while_there_is_time(sink, height, warned, deployed):
+    """Whether the drogue is the parachute (deploy_stage) or not."""
     story = Story(shipped("rocket")).ready().fly(1.0)
-    said = parachute(deployed=deployed, state=ParachuteState.LAUNCHED)
+    said = launched(deployed)
     for _ in range(80):
         height -= 0.1 * sink
         flies = story.told(height=height, vertical_speed=-sink, tilt=math.nan)
@@ -165,7 +172,7 @@ def test_a_drogue_that_hardly_brakes_is_told_while_there_is_time(sink, height, w
 
 def test_ten_kilometres_up_a_drogue_that_works_may_be_faster():
     story = Story(shipped("rocket")).ready().fly(1.0)
-    height, said = 14_000.0, parachute(deployed=True, state=ParachuteState.LAUNCHED)
+    height, said = 14_000.0, launched(True)
     while height > 10_500.0:
         height -= 7.0
         flies = story.told(height=height, vertical_speed=-70.0, tilt=math.nan)

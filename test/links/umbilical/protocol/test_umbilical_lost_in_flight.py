@@ -1,5 +1,7 @@
 """A flight computer that restarts, fails or says nonsense in flight: it is still in the air."""
 
+import math
+
 import pytest
 from umbilical_rocket import (
     ASCENT,
