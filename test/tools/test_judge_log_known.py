@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,10 @@ from log_bench import FAILS_AT, FALLS_FROM, judged, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command
-from chute_ros.tools.judge_log.findings import LogVerdict, verdict_of
+from chute_ros.tools.judge_log.findings import LogVerdict, Rating, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
+from chute_ros.tools.state_rows import RuleTold
 
 HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
 
@@ -92,3 +94,10 @@ def test_a_table_that_is_none_is_refused(text, says, tmp_path):
         known_of(tsv)
     assert says in str(caught.value)
     assert str(tsv) in str(caught.value)
+
+
+def test_a_full_counter_that_ended_nothing_says_what_it_lacked():
+    full = RuleTold("main overdue", "DEPLOY", (), hold=1.5, peak=1.5)
+    assert "too few distinct samples" in Rating(full, (), 0.0).short_of
+    for other in (replace(full, fulfilled_at=3.0), replace(full, peak=1.4)):
+        assert Rating(other, (), 0.0).short_of == ""

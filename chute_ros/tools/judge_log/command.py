@@ -184,7 +184,7 @@ def _tell(verdict: LogVerdict, one: JudgedLog, tried: Sequence[Tried]) -> None:
         f"  {verdict.words}",
     ]
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
-    lines += [f"  nearest: {_came(one.told)}" for one in verdict.moved[:3]]
+    lines += [f"  nearest: {_came(near.told)}{near.short_of}" for near in verdict.moved[:3]]
     lines += [
         f"  not known: {u.name} for {100.0 * u.share:.0f} % of the {span} ({u.why})"
         for u in verdict.unknown

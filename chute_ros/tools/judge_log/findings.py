@@ -43,6 +43,13 @@ class Rating:
             return self.told.peak / self.told.hold
         return 0.0 if math.isnan(self.told.fulfilled_at) else 1.0
 
+    @property
+    def short_of(self) -> str:
+        """What it lacked beside a full counter, in words; empty: nothing, or its counter was not
+        full."""
+        full = self.share >= 1.0 and math.isnan(self.told.fulfilled_at)
+        return ", shown by too few distinct samples" if full else ""
+
 
 @dataclass(frozen=True)
 class LogVerdict:
@@ -70,7 +77,9 @@ class LogVerdict:
     def nearest(self) -> str:
         """Which rule, and how near it came, in words."""
         near = next(iter(self.moved), None)
-        return f"{near.told.name}: {100.0 * near.share:.0f} %" if near else "none moved"
+        if near is None:
+            return "none moved"
+        return f"{near.told.name}: {100.0 * near.share:.0f} %{near.short_of}"
 
     @property
     def ended(self) -> bool:
