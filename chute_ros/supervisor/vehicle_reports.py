@@ -164,7 +164,11 @@ def _note_contradictions(turn: Turn) -> None:
 
     cosine = math.cos(certain(TILT) / DEGREES)
     moment = (now, certain(VERTICAL_SPEED), certain(ACCELERATION), cosine)
-    motion = noted(state.heard.motion, moment)
+    known = state.heard.motion
+    if state.measured(VERTICAL_SPEED).source != turn.before.measured(VERTICAL_SPEED).source:
+        # From one that had fallen silent to another is no change that anybody could have felt.
+        known = tuple((at, math.nan, force, leans) for at, _, force, leans in known)
+    motion = noted(known, moment)
     if motion is state.heard.motion:
         return
     denied = denials(
