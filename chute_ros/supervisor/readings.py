@@ -46,7 +46,7 @@ PARTS = {"tilt_deg": "attitude"}
 _STEP_UP = 10.0
 #: A height that is the same to the last bit so shortly after, s, is no other sample: barometers
 #: that are read more often than they measure (at 4 Hz and more).
-_TOLD_AGAIN = 0.3
+_TOLD_AGAIN, _FEW = 0.3, 4
 #: A speed that is the same to the last bit for so long stands, s: ten samples of one that lives.
 _STANDS = 1.0
 #: What a barometer told longer ago says nothing of a fall, s.
@@ -255,12 +255,12 @@ def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> 
 
 def _samples(heights: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     """Without what is the same to the last bit as one before it of a moment ago: it was told more
-    often than measured."""
+    often than measured. Where that leaves few, of which no middle one can be told, all of them."""
     kept = [heights[0]]
     for one in heights[1:]:
         if one[1] != kept[-1][1] or one[0] - kept[-1][0] > _TOLD_AGAIN:
             kept.append(one)
-    return tuple(kept) if len(kept) > 1 else heights
+    return tuple(kept) if len(kept) >= _FEW else heights
 
 
 @lru_cache(maxsize=16)  # as _rate
