@@ -46,7 +46,7 @@ PARTS = {"tilt_deg": "attitude"}
 _STEP_UP = 10.0
 #: A height that is the same to the last bit so shortly after, s, is no other sample: barometers
 #: that are read more often than they measure (at 4 Hz and more).
-_TOLD_AGAIN, _FEW = 0.3, 4
+_TOLD_AGAIN, _FEW = 0.3, 3
 #: A speed that is the same to the last bit for so long stands, s: ten samples of one that lives.
 _STANDS = 1.0
 #: What a barometer told longer ago says nothing of a fall, s.
@@ -255,7 +255,7 @@ def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> 
 
 def _samples(heights: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     """Without what is the same to the last bit as one before it of a moment ago: it was told more
-    often than measured. Where that leaves few, of which no middle one can be told, all of them."""
+    often than measured. Where that leaves too few, all of them."""
     kept = [heights[0]]
     for one in heights[1:]:
         if one[1] != kept[-1][1] or one[0] - kept[-1][0] > _TOLD_AGAIN:
@@ -280,8 +280,10 @@ def _rise(heights: tuple[tuple[float, float], ...]) -> Rise:
 def _rate(heights: tuple[tuple[float, float], ...]) -> float:
     """What heights (monotonic s, m) tell of a climb, m/s."""
     heights = _samples(heights)
-    # The middle one of the single rates: one step of a height, however high, is no climb.
-    rate = median(_rates(heights))
+    # The middle one of the single rates: one step of a height, however high, is no climb; nor is it
+    # where there are but two.
+    rates = _rates(heights)
+    rate = median(rates) if len(rates) > 2 else min(rates, key=abs)
     # The noise of neighbours has a middle one as well; over the whole second it is small, where a
     # step is large. What both of them tell is flown.
     over = _slope(heights)

@@ -322,6 +322,8 @@ def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own():
         ([0.0, 0.1, 0.2, 0.3, 0.4, -2.0, -1.9, -1.8, -1.7, -1.6], 0.0, ""),
         # It falls with 40 m/s, and its barometer measures half as often as it is read.
         ([200.0 - 8.0 * (n // 2) for n in range(10)], -40.0, ""),
+        # One step of what stands is none, however few samples there are.
+        ([50.0, 50.0, 50.0, 50.0, 50.0, 40.0], 0.0, ""),
         # It stands: what is the same for longer is no sample that was told again.
         ([50.0] * 10, 0.0, ""),
         # A slow climb is one.
