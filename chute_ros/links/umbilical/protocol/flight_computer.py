@@ -37,7 +37,8 @@ _REST_HEIGHT, _REST_TIME = 3.0, 5.0
 #: been the same to the last bit for as long: satellites that are not heard any more.
 _SPEEDS_OVER, _REST_SPEED = 3.0, 1.0
 #: A barometer whose pressure has been the same to the last bit for so long, s, tells no height that
-#: changes: one that counts on from its last value sinks by what it takes from it each turn.
+#: changes by more than at rest: one that counts on from its last value sinks by what it takes from
+#: it each turn.
 _PRESSURE_STANDS = 0.6
 #: It stands, whatever its mode, if so long, s, it has stayed where it is and feels its weight to
 #: this, m/s^2, and its barometer has lived within this, s.
@@ -323,7 +324,8 @@ class FlightComputerTracker:
         known."""
         stood = record.received - self._pressure_since
         stands = self._pressure_told > 2 and stood > _PRESSURE_STANDS
-        if stands and record.number("altitude") != self._pressure_altitude:
+        moved = abs(record.number("altitude") - self._pressure_altitude)
+        if stands and moved > _REST_HEIGHT:
             return NAN
         if not math.isnan(self._pressure_zero):
             return _by_pressure(record) - self._pressure_zero
