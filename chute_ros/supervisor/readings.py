@@ -280,8 +280,8 @@ def _rise(heights: tuple[tuple[float, float], ...]) -> Rise:
 def _rate(heights: tuple[tuple[float, float], ...]) -> float:
     """What heights (monotonic s, m) tell of a climb, m/s."""
     heights = _samples(heights)
-    # The middle one of the single rates: one step of a height, however high, is no climb; nor is it
-    # where there are but two.
+    # The middle one of the single rates: one step of a height, however high, is no climb; nor is
+    # it where there are but two.
     rates = _rates(heights)
     rate = median(rates) if len(rates) > 2 else min(rates, key=abs)
     # The noise of neighbours has a middle one as well; over the whole second it is small, where a

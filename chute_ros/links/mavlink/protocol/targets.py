@@ -159,8 +159,8 @@ class Targets:
         self._take("full_thrust", message.thrust, not lifts, now)
 
     def lies_on_its_wing(self, now: float) -> bool:
-        """A tail-sitter of PX4 does, or is on the way: it goes on to tell the attitude of its hover,
-        which is 90 degrees from upright then (its FailureDetector turns it)."""
+        """A tail-sitter of PX4 does, or is on the way: it goes on to tell the attitude of its
+        hover, which is 90 degrees from upright then (its FailureDetector turns it)."""
         tail_sitter = self.vehicle.px4 and self.vehicle.kind in _TAIL_SITTERS
         return tail_sitter and self._vtol_state(now) != _ON_LIFT_MOTORS
 

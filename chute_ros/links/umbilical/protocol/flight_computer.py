@@ -33,12 +33,12 @@ DEVICE = "flight_computer"
 #: It has landed when its altitude stays within so many metres for so many seconds after a
 #: deployment: the slowest canopy falls several times as fast.
 _REST_HEIGHT, _REST_TIME = 3.0, 5.0
-#: Speeds of so long, s, are that of one that moves by their mean beyond this, m/s, unless they have
-#: been the same to the last bit for as long: satellites that are not heard any more.
+#: Speeds of so long, s, are of one that moves if their mean is beyond this, m/s, unless they have
+#: been the same to the last bit for half as long: satellites that are not heard any more.
 _SPEEDS_OVER, _REST_SPEED = 3.0, 1.0
-#: A barometer whose pressure has been the same to the last bit for so long, s, tells no height that
-#: changes by more than at rest: one that counts on from its last value sinks by what it takes from
-#: it each turn.
+#: A barometer whose pressure has been the same to the last bit for so long, s, tells no height
+#: that changes by more than at rest: one that is lost may go on from its last value, and sink by
+#: what is taken from it at each turn.
 _PRESSURE_STANDS = 0.6
 #: It stands, whatever its mode, if so long, s, it has stayed where it is and feels its weight to
 #: this, m/s^2, and its barometer has lived within this, s.
@@ -391,7 +391,8 @@ class FlightComputerTracker:
     def _stands(self) -> bool:
         if self.record is None or not self.record.received - self._rest_since >= _STANDS_AFTER:
             return False
-        return self._pressure_lives(self.record) and abs(_force(self.record) - _GRAVITY) <= _ITS_WEIGHT
+        feels_its_weight = abs(_force(self.record) - _GRAVITY) <= _ITS_WEIGHT
+        return self._pressure_lives(self.record) and feels_its_weight
 
     def _motors(self) -> Armed:
         """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
@@ -427,8 +428,8 @@ class FlightComputerTracker:
             faults.append(f"flight mode {self.record['flight_mode']} has no name")
         elif self.mode in IN_FLIGHT and not self.flying and not self.landed:
             faults.append(
-                f"flight mode {self.mode.name.capitalize()} while it stands: it did not fly, or came "
-                "down without a canopy; stay away, its charges may be live"
+                f"flight mode {self.mode.name.capitalize()} while it stands: it did not fly, or "
+                "came down without a canopy; stay away, its charges may be live"
             )
         for name in ("altitude", "pressure"):
             if not math.isfinite(self.record.number(name)):

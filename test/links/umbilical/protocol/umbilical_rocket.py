@@ -21,8 +21,8 @@ class Rocket:
         self.started = -100.0
 
     def says(self, at, mode, **texts):
-        """A record; what changed of the link, and what its clock says. Of an altitude that is named
-        the pressure is that of the standard atmosphere."""
+        """A record; what changed of the link, and what its clock says. Of an altitude that is
+        named the pressure is that of the standard atmosphere."""
         altitude = float(texts.get("altitude", "nan"))
         if math.isfinite(altitude) and "pressure" not in texts:
             texts["pressure"] = f"{SEA_LEVEL * (1.0 - altitude / 44_330.8) ** 5.256:.3f}"
