@@ -143,8 +143,9 @@ class Targets:
         self._axis_at = -math.inf
         #: The vehicle's own, lately, with the time, oldest first.
         self._own: deque[tuple[float, Vector]] = deque()
-        #: The commanded height, lately, with the time, oldest first; of one message each time.
-        self._heights: deque[tuple[float, float]] = deque()
+        #: Height target -> what it was lately, m above what it counts from, with the time, oldest
+        #: first.
+        self._heights: dict[str, deque[tuple[float, float]]] = {}
 
     def attitude_target(self, message: Any, newest_ms: int | None, now: float) -> None:
         """ATTITUDE_TARGET; newest_ms: the autopilot's newest time_boot_ms, None: not known."""
@@ -184,8 +185,7 @@ class Targets:
             return
         mask = message.type_mask
         self._take("target_speed_local", -message.vz, mask & _VZ_IGNORED, now)
-        self._take("target_above_origin", -message.z, mask & _Z_IGNORED, now)
-        self._note_height(-message.z, mask & _Z_IGNORED, now)
+        self._take_height("target_above_origin", -message.z, mask & _Z_IGNORED, now)
 
     def position_target_global_int(self, message: Any, now: float) -> None:
         """POSITION_TARGET_GLOBAL_INT: height by its frame."""
@@ -194,9 +194,8 @@ class Targets:
         mask, frame = message.type_mask, message.coordinate_frame
         ignored = mask & _Z_IGNORED
         self._take("target_speed_global", -message.vz, mask & _VZ_IGNORED, now)
-        self._take("target_altitude", message.alt, ignored or frame not in _ABOVE_SEA, now)
-        self._take("target_height", message.alt, ignored or frame not in _ABOVE_HOME, now)
-        self._note_height(message.alt, ignored, now)
+        self._take_height("target_altitude", message.alt, ignored or frame not in _ABOVE_SEA, now)
+        self._take_height("target_height", message.alt, ignored or frame not in _ABOVE_HOME, now)
 
     def nav_controller_output(self, message: Any, now: float) -> None:
         """NAV_CONTROLLER_OUTPUT: alt_error is the target less the height, m; on the wing nav_roll
@@ -211,10 +210,9 @@ class Targets:
         if commanded and all(map(math.isfinite, angles)):
             self._axis, self._axis_at = vertical_axis(*angles), now
         modes = _HEIGHT_HELD.get(state, frozenset())
-        self._take("height_error", message.alt_error, mode not in modes, now)
         climbed = self._readings.value("vertical_speed") * self._readings.age("altitude", now)
-        height = self._fresh("altitude", now) + climbed + message.alt_error
-        self._note_height(height, mode not in modes, now)
+        here = self._fresh("altitude", now) + climbed
+        self._take_height("height_error", message.alt_error, mode not in modes, now, here)
 
     def at(self, now: float) -> tuple[float, float, float]:
         """Commanded vertical speed (m/s, up positive), and how far below its target the vehicle is
@@ -224,25 +222,29 @@ class Targets:
             speed = self._fresh("target_speed_global", now)
         if math.isnan(speed) and not math.isnan(self._fresh("full_thrust", now)):
             speed = 0.0
-        below = self._below(now)
+        target, below = self._below(now)
         if math.isnan(speed) and below > 0.0:
-            speed = self._comes_down(now)
+            speed = self._comes_down(target)
         return speed, below, self._readings.age("target", now)
 
-    def _note_height(self, height: float, ignored: object, now: float) -> None:
-        """Of a height target that is commanded now, m above whatever its message counts from."""
-        if ignored or not math.isfinite(height):
-            self._heights.clear()
+    def _take_height(
+        self, part: str, value: float, ignored: object, now: float, here: float = 0.0
+    ) -> None:
+        """A height target; here: what it counts from, m."""
+        self._take(part, value, ignored, now)
+        if ignored or not math.isfinite(here + value):
+            self._heights.pop(part, None)
             return
-        self._heights.append((now, height))
-        while now - self._heights[0][0] > _TARGETS_OVER:
-            self._heights.popleft()
+        lately = self._heights.setdefault(part, deque())
+        lately.append((now, here + value))
+        while now - lately[0][0] > _TARGETS_OVER:
+            lately.popleft()
 
-    def _comes_down(self, now: float) -> float:
+    def _comes_down(self, target: str) -> float:
         """The vertical speed of a height target that comes down, m/s; NaN: it does not, as far as
         anybody knows."""
-        told = [one for one in self._heights if now - one[0] <= _TARGETS_OVER]
-        if len(told) < 2 or told[-1][0] - told[0][0] < _TARGETS_SPAN:
+        told = self._heights.get(target)
+        if not told or told[-1][0] - told[0][0] < _TARGETS_SPAN:
             return math.nan
         rates = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(told) if b[0] > a[0]]
         rate = median(rates)
@@ -260,12 +262,13 @@ class Targets:
         """MAV_VTOL_STATE; NaN: not known."""
         return self._readings.fresh("vtol_state", _VTOL_STATE_SILENCE, now)
 
-    def _below(self, now: float) -> float:
+    def _below(self, now: float) -> tuple[str, float]:
+        """The best height target, and how far below it the vehicle is, m."""
         for target, actual in _SET_AGAINST.items():
             below = self._fresh(target, now) - self._fresh(actual, now)
             if not math.isnan(below):
-                return below
-        return self._fresh("height_error", now)
+                return target, below
+        return "height_error", self._fresh("height_error", now)
 
     def _fresh(self, part: str, now: float) -> float:
         return self._readings.fresh(part, TARGET_SILENCE, now)

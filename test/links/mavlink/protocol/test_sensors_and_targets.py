@@ -404,6 +404,16 @@ def test_one_that_sinks_below_a_target_that_does_not_was_not_commanded_to(target
     assert falls.below_target > 30.0
 
 
+def test_targets_that_count_from_elsewhere_do_not_come_down_from_one_another():
+    """ArduCopter tells one above its origin, and the same above the sea."""
+    heard = Told().hear(COPTER)
+    for k in range(1, 30):
+        target = to_fly(z=-70.0, mask=32) if k % 2 else to_be_at(520.0)
+        heard.hear(local(-50.0 + k), at_altitude(500.0 - k), target, now=0.1 * k)
+        assert math.isnan(heard.at(0.1 * k).target_vertical_speed), k
+    assert heard.at(2.9).below_target == pytest.approx(49.0)
+
+
 def test_in_modes_whose_message_tells_no_command_nothing_of_it_is_known():
     """STABILIZE and TRAINING tell level whatever the sticks do, ACRO the own attitude."""
     for mode, commanded in [(2, False), (3, False), (4, False), (5, True), (12, True)]:
