@@ -117,6 +117,9 @@ class Flight:
         self.rig = _rig(scenario, shipped, make_peer)
         self._arming: PersonCall | None = None
         self._person = PersonCall(self.rig, self._wish)
+        several = len(scenario.carries.supervised("deploy_links")) > 1
+        #: So long after its release, s.
+        self._followed = _FOLLOWED_TO_NEXT if several else _FOLLOWED_RELEASE
         self.up = self._took_off = math.nan
         #: That were begun.
         self._flights = 0
@@ -193,8 +196,7 @@ class Flight:
         if now > rig.landed + (_STANDS if self.scenario.lands else _LIES):
             return True
         if not math.isnan(rig.released) and self._is_carried():
-            several = len(self.scenario.carries.supervised("deploy_links")) > 1
-            due = rig.released + (_FOLLOWED_TO_NEXT if several else _FOLLOWED_RELEASE)
+            due = rig.released + self._followed
             return now > max(due, quiet if self.scenario.burn else 0.0)
         return now > quiet and not (rig.truth.falls or rig.another.falls)
 

@@ -220,7 +220,7 @@ def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
 
 def low_as_at_take_off(config: SupervisorConfig, state: State, now: float) -> bool:
     """Its height is known, and is that of where it was armed."""
-    height = measured(config, state, HEIGHT, now) - state.flight.armed_height
+    height = _above_start(config, state, now)
     by_pressure = pressure_height(config, state, now)
     limit = config.takeoff_height
     low = height <= limit or (math.isnan(height) and by_pressure <= limit)
@@ -290,17 +290,23 @@ def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
         # One that has not flown and whose motors are off does not fly, whatever drifts.
         flies = not down and (not off or _rises_on_what_is_off(config, state, now))
         return flies or _falls_against_its_word(config, state, down and off, now)
-    height = measured(config, state, "height", now)
+    height = _above_start(config, state, now)
     if armed(config, state, now) is Armed.ARMED and not math.isnan(height):
-        return height - state.flight.armed_height > config.takeoff_height
+        return height > config.takeoff_height
     return None
+
+
+def _above_start(config: SupervisorConfig, state: State, now: float) -> float:
+    """Its height above where it was armed, m; NaN: not known."""
+    return measured(config, state, HEIGHT, now) - state.flight.armed_height
 
 
 def _rises_on_what_is_off(config: SupervisorConfig, state: State, now: float) -> bool:
     """A rocket whose motor has no valve, or has burnt out, as it was first heard."""
-    height = measured(config, state, HEIGHT, now) - state.flight.armed_height
-    high = height > config.takeoff_height and bool(moving(config, state, now))
-    return config.profile.vehicle is Airframe.ROCKET and high
+    if config.profile.vehicle is not Airframe.ROCKET:
+        return False
+    high = _above_start(config, state, now) > config.takeoff_height
+    return high and bool(moving(config, state, now))
 
 
 def _falls_against_its_word(
@@ -316,8 +322,8 @@ def _falls_against_its_word(
     falls = measured(config, state, "acceleration", now) < FREE_FALL
     speed = measured(config, state, VERTICAL_SPEED, now)
     sinks = speed < -config.profile.moving_speed
-    height = measured(config, state, "height", now) - state.flight.armed_height
-    high = height > max(config.takeoff_height, config.profile.minimum_height)
+    worth_it = max(config.takeoff_height, config.profile.minimum_height)
+    high = _above_start(config, state, now) > worth_it
     # One that is not known is no second sign.
     both = speed, pressure_rate(config, state, now)
     agree = all(one < -_SINKS_FOR_SURE for one in both)

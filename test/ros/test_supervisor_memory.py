@@ -169,6 +169,14 @@ def tells(pair, stage, deployed=False, armed=False):
     client.destroy_publisher(publisher)
 
 
+def told_and_kept(pair, stage, kind, **said):
+    """On the ground the parachute tells this: the file in which it is kept."""
+    pair.start("a", 0, **ALONE)
+    pair.await_stage(SafetyState.READY)
+    tells(pair, stage, **said)
+    return the_file(pair, kind)
+
+
 def start_again_set_otherwise(pair, path, damaged):
     pair.send_signal("a", signal.SIGSTOP)
     if damaged:
@@ -179,10 +187,7 @@ def start_again_set_otherwise(pair, path, damaged):
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pair, damaged):
-    pair.start("a", 0, **ALONE)
-    pair.await_stage(SafetyState.READY)
-    tells(pair, SafetyState.BLOCKED, deployed=True)
-    path = the_file(pair, "released")
+    path = told_and_kept(pair, SafetyState.BLOCKED, "released", deployed=True)
     start_again_set_otherwise(pair, path, damaged)
     # Given a module that started anew too
     tells(pair, SafetyState.BLOCKED)
@@ -203,10 +208,7 @@ def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pa
 
 @pytest.mark.parametrize("damaged", [False, True])
 def test_one_that_was_armed_as_its_node_died_is_told_whatever_starts_anew(pair, damaged):
-    pair.start("a", 0, **ALONE)
-    pair.await_stage(SafetyState.READY)
-    tells(pair, SafetyState.ARMED, armed=True)
-    path = the_file(pair, "armed")
+    path = told_and_kept(pair, SafetyState.ARMED, "armed", armed=True)
     pair.link.beating = False
     pair.await_stage(SafetyState.BLOCKED)
     start_again_set_otherwise(pair, path, damaged)

@@ -6,11 +6,11 @@ from umbilical_lines import record
 
 from chute_ros.links.umbilical.protocol.flight_computer import FlightComputerTracker
 from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.sim.air import air_at
 
 STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
 LIMITS = LivenessLimits(3.0, 15.0)
 ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
-SEA_LEVEL = 101_325.0  # Pa
 
 
 class Rocket:
@@ -25,7 +25,7 @@ class Rocket:
         named the pressure is that of the standard atmosphere."""
         altitude = float(texts.get("altitude", "nan"))
         if math.isfinite(altitude) and "pressure" not in texts:
-            texts["pressure"] = f"{SEA_LEVEL * (1.0 - altitude / 44_330.8) ** 5.256:.3f}"
+            texts["pressure"] = f"{air_at(altitude).pressure:.3f}"
         clock = {"ms_since_boot_cfc": str(round((at - self.started) * 1000))}
         texts = {**ON_PAD, **clock, "flight_mode": str(mode), **texts}
         came = self.computer.heard(record(at, **texts), at)
