@@ -6,14 +6,13 @@ Source: Umbilical Reference, sections 1 and 3.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable
-from statistics import fmean
 
 from chute_ros.links.umbilical.protocol.canopies import CANOPIES, Canopies
 from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.links.umbilical.protocol.layouts import Record
 from chute_ros.links.umbilical.protocol.modes import GROUND, IN_FLIGHT, FlightMode
+from chute_ros.links.umbilical.protocol.rest import FIX_3D, Rest, force
 from chute_ros.model import (
     NAN,
     Armed,
@@ -30,20 +29,6 @@ from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 
 #: Who it is on the link; there is one at the end of a cable.
 DEVICE = "flight_computer"
-#: It has landed when its altitude stays within so many metres for so many seconds after a
-#: deployment: the slowest canopy falls several times as fast.
-_REST_HEIGHT, _REST_TIME = 3.0, 5.0
-#: Speeds of so long, s, are of one that moves if their mean is beyond this, m/s, unless they have
-#: been the same to the last bit for half as long: satellites that are not heard any more.
-_SPEEDS_OVER, _REST_SPEED = 3.0, 1.0
-#: A barometer whose pressure has been the same to the last bit for so long, s, tells no height
-#: that changes by more than at rest: one that is lost may go on from its last value, and sink by
-#: what is taken from it at each turn.
-_PRESSURE_STANDS = 0.6
-#: It stands, whatever its mode, if so long, s, it has stayed where it is and feels its weight to
-#: this, m/s^2, and its barometer has lived within this, s.
-_STANDS_AFTER, _ITS_WEIGHT, _LIVES_WITHIN = 10.0, 2.0, 2.0
-_GRAVITY = 9.81
 #: A clock that falls behind ours by more, from one record to the next, may have started anew, s.
 _FALLS_BEHIND = 0.5
 #: So many records in a row must say that a canopy is out which nobody fired from here: text
@@ -53,7 +38,6 @@ _TO_BELIEVE = 2
 _OPENS = 3.0
 #: What was fired on the ground is not packed and wired anew in less, s.
 _PACKED_AFTER = 300.0
-_FIX_3D = 3
 _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
 
@@ -75,14 +59,7 @@ class FlightComputerTracker:
         self._cable_pulled = False
         #: In the air, as far as its records have told.
         self.flying = False
-        self._rest_altitude = NAN
-        self._rest_since = NAN
-        #: Its downward speeds of the last seconds, with their times; m/s.
-        self._speeds: deque[tuple[float, float]] = deque()
-        #: Since when its pressure is the same to the last bit, in so many records, and what its
-        #: altitude was then, m.
-        self._pressure_since = self._pressure_altitude = NAN
-        self._pressure_told = 0
+        self._rest = Rest()
         #: Its altitude where it stands before the flight, m: it may count from the sea. NaN: it
         #: was not heard there.
         self._ground = NAN
@@ -119,7 +96,7 @@ class FlightComputerTracker:
             self.restarts += 1
             self.restarted_in_flight = self.flying
             # Its altitude may count from elsewhere now.
-            self._rest_altitude = NAN
+            self._rest.begin_anew()
             if self.record is not None and math.isnan(self._pressure_zero):
                 # Where the ground's is not known its height goes on from what it was.
                 last = _by_pressure(self.record) - self._height(self.record)
@@ -134,19 +111,18 @@ class FlightComputerTracker:
         if before is None or before["ms_since_boot_cfc"] != record["ms_since_boot_cfc"]:
             self._clock_moved_at = now
         self.records += 1
-        if before is None or before["pressure"] != record["pressure"]:
-            self._pressure_since, self._pressure_altitude = now, record.number("altitude")
-            self._pressure_told = 0
-        self._pressure_told += 1
         # The first one tells what happened before it was heard.
         row = self._out_in_a_row + 1 if before is not None else _TO_BELIEVE
         self._out_in_a_row = row if self._says_out(self._counting) else 0
-        self._watch_rest(before, record, now)
+        was_out, self._was_out = self._was_out, self._says_out(CANOPIES)
+        came_out = self._was_out and not was_out
+        took_off = self.mode in IN_FLIGHT and (before is None or _mode(before) not in IN_FLIGHT)
+        self._rest.watch(record, moves=came_out or took_off)
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
         if self.mode in GROUND and not self.flying:
             self._canopies, self._pressure_zero = Canopies(), NAN
-            if self._at_rest or math.isnan(self._ground):
+            if self._rest.rests or math.isnan(self._ground):
                 self._ground = record.number("altitude")
                 self._ground_by_pressure = _by_pressure(record)
         return self.liveness.heard(now), age
@@ -219,7 +195,7 @@ class FlightComputerTracker:
     def landed(self) -> bool:
         """After a deployment its altitude does not change any more, by its records: silence is
         no rest."""
-        return self._says_out(CANOPIES) and self._at_rest
+        return self._says_out(CANOPIES) and self._rest.rests
 
     @property
     def deployed(self) -> bool:
@@ -291,8 +267,8 @@ class FlightComputerTracker:
         if record is None:
             return VehicleState()
         age = now - record.received
-        acceleration = _force(record)
-        has_fix = record.number("fix_type") >= _FIX_3D
+        acceleration = force(record)
+        has_fix = record.number("fix_type") >= FIX_3D
         speed = -record.number("vel_d") if has_fix else NAN
         height = self._height(record)
         return VehicleState(
@@ -322,10 +298,7 @@ class FlightComputerTracker:
     def _height(self, record: Record) -> float:
         """Above where it took off, m; of one that was first heard in flight its altitude. NaN: not
         known."""
-        stood = record.received - self._pressure_since
-        stands = self._pressure_told > 2 and stood > _PRESSURE_STANDS
-        moved = abs(record.number("altitude") - self._pressure_altitude)
-        if stands and moved > _REST_HEIGHT:
+        if self._rest.barometer_is_lost:
             return NAN
         if not math.isnan(self._pressure_zero):
             return _by_pressure(record) - self._pressure_zero
@@ -343,56 +316,17 @@ class FlightComputerTracker:
         ran = (int(record["ms_since_boot_cfc"]) - int(before["ms_since_boot_cfc"])) / 1000.0
         return record.received - before.received - ran > _FALLS_BEHIND
 
-    def _watch_rest(self, before: Record | None, record: Record, now: float) -> None:
-        altitude = record.number("altitude")
-        was_out, self._was_out = self._was_out, self._says_out(CANOPIES)
-        came_out = self._was_out and not was_out
-        took_off = self.mode in IN_FLIGHT and (before is None or _mode(before) not in IN_FLIGHT)
-        # A barometer that is stuck is no rest where the satellites tell of a fall.
-        moves = self._moves_by_satellites(record, now)
-        stays = abs(altitude - self._rest_altitude) <= _REST_HEIGHT
-        if came_out or took_off or moves or not stays:
-            self._rest_altitude, self._rest_since = altitude, now
-
-    def _moves_by_satellites(self, record: Record, now: float) -> bool:
-        speed = record.number("vel_d") if record.number("fix_type") >= _FIX_3D else NAN
-        if math.isnan(speed):
-            self._speeds.clear()
-            return False
-        self._speeds.append((now, speed))
-        while now - self._speeds[0][0] > _SPEEDS_OVER:
-            self._speeds.popleft()
-        speeds = [one for _, one in self._speeds]
-        frozen = len(set(speeds)) == 1 and now - self._speeds[0][0] > _SPEEDS_OVER / 2.0
-        ignored = frozen and self._pressure_lives(record)
-        return not ignored and abs(fmean(speeds)) > _REST_SPEED
-
-    def _pressure_lives(self, record: Record) -> bool:
-        return record.received - self._pressure_since <= _LIVES_WITHIN
-
     def _watch_flight(self) -> None:
         """Whether it flies: a ground mode after a restart in the air, and a mode without a name or
         a fault, say nothing of it until its altitude stays. A mode of the flight says so until it
         is seen to stand: the motor did not burn, or it came down without a canopy."""
         if self.mode in IN_FLIGHT:
-            flies = not self.landed and not self._stands
+            flies = not self.landed and not self._rest.stands
             if flies and not self.flying:
                 self.restarted_in_flight = False  # what happened in another flight
             self.flying = flies
-        elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
+        elif self._rest.rests or (self.mode in GROUND and not self.restarted_in_flight):
             self.flying = False
-
-    @property
-    def _at_rest(self) -> bool:
-        """Its altitude has not changed for a while, by its records: silence is no rest."""
-        return self.record is not None and self.record.received - self._rest_since >= _REST_TIME
-
-    @property
-    def _stands(self) -> bool:
-        if self.record is None or not self.record.received - self._rest_since >= _STANDS_AFTER:
-            return False
-        feels_its_weight = abs(_force(self.record) - _GRAVITY) <= _ITS_WEIGHT
-        return self._pressure_lives(self.record) and feels_its_weight
 
     def _motors(self) -> Armed:
         """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
@@ -407,7 +341,7 @@ class FlightComputerTracker:
     def _landed_state(self) -> LandedState:
         if self.flying:
             return LandedState.IN_AIR
-        if self.mode in GROUND or self.landed or self._stands:
+        if self.mode in GROUND or self.landed or self._rest.stands:
             return LandedState.ON_GROUND
         return LandedState.UNKNOWN
 
@@ -456,11 +390,6 @@ class FlightComputerTracker:
 
 def _mode(record: Record) -> FlightMode | None:
     return _MODES.get(int(record["flight_mode"]))
-
-
-def _force(record: Record) -> float:
-    """Length of the specific force, m/s^2."""
-    return math.sqrt(sum(record.number(f"accel_{axis}") ** 2 for axis in "xyz"))
 
 
 def _by_pressure(record: Record) -> float:
